@@ -1,0 +1,398 @@
+"""Skeletons, clips and sets of clips: the data every later stage reads.
+
+A :class:`ClipSet` holds all clips on one skeleton at one rate, concatenated, so that one frame
+number addresses everything: pose, contact, strike. Metres, radians, Y up, wxyz.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+
+from kumite import rotation
+from kumite.errors import KumiteError
+from kumite.kernels import pose as pose_kernels
+
+NO_PARENT = -1  # parents[0] of every skeleton
+
+SIDES = ("left", "right")
+ARM_ROLES = ("clavicle", "upper_arm", "forearm", "hand")
+LEG_ROLES = ("thigh", "shin", "foot", "toe")
+ROLES = (
+    "pelvis",
+    "chest",
+    "neck",
+    "head",
+    *(f"{side}_{part}" for side in SIDES for part in (*ARM_ROLES, *LEG_ROLES)),
+)
+"""What a joint is for. A limb's joint carries the name of the segment that turns with it:
+``left_forearm`` is the elbow, ``left_hand`` the wrist, ``left_shin`` the knee."""
+REQUIRED_ROLES = tuple(
+    r for r in ROLES if r not in ("neck", *(f"{s}_{p}" for s in SIDES for p in ("clavicle", "toe")))
+)
+LIMBS = ("left_hand", "right_hand", "left_foot", "right_foot")
+"""The limbs that can strike, in the order of every [.., 4] limb array."""
+
+
+def _frozen(array: np.ndarray, dtype: type) -> np.ndarray:
+    out = np.ascontiguousarray(array, dtype=dtype)
+    if out.flags.writeable:
+        out = out.copy() if out is array else out
+        out.flags.writeable = False
+    return out
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """A tree of joints with rigid bones, parents before children."""
+
+    names: tuple[str, ...]
+    parents: np.ndarray  # [J] int32, parents[0] = NO_PARENT
+    offsets: np.ndarray  # [J, 3] m, from the parent, in the parent's axes; offsets[0] is not used
+    roles: Mapping[str, int] = field(default_factory=dict)  # role -> joint
+    tip_parents: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))  # [T] End Sites
+    tip_offsets: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # [T, 3] m
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "names", tuple(self.names))
+        put(self, "parents", _frozen(self.parents, np.int32))
+        put(self, "offsets", _frozen(self.offsets, np.float64))
+        put(self, "tip_parents", _frozen(self.tip_parents, np.int32))
+        put(self, "tip_offsets", _frozen(np.reshape(self.tip_offsets, (-1, 3)), np.float64))
+        put(self, "roles", MappingProxyType({k: int(v) for k, v in self.roles.items()}))
+        count = len(self.names)
+        if self.parents.shape != (count,) or self.offsets.shape != (count, 3):
+            raise KumiteError(
+                f"skeleton: {count} names, parents {self.parents.shape}, "
+                f"offsets {self.offsets.shape}; expected [J], [J], [J, 3]"
+            )
+        if count == 0 or self.parents[0] != NO_PARENT:
+            raise KumiteError("skeleton: the first joint must be the root")
+        if np.any(self.parents[1:] < 0) or np.any(self.parents[1:] >= np.arange(1, count)):
+            raise KumiteError("skeleton: parents must come before their children")
+        if len(set(self.names)) != count:
+            twice = sorted({n for n in self.names if self.names.count(n) > 1})
+            raise KumiteError(f"skeleton: joint names used twice: {', '.join(twice)}")
+        if not np.all(np.isfinite(self.offsets)):
+            raise KumiteError("skeleton: offsets must be finite")
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def same_as(self, other: Skeleton) -> bool:
+        """Same joints with the same lengths, within a millimetre."""
+        return (
+            self.names == other.names
+            and np.array_equal(self.parents, other.parents)
+            and bool(np.allclose(self.offsets[1:], other.offsets[1:], atol=1e-3))
+        )
+
+    def joint(self, role: str) -> int:
+        """The joint of a role; :class:`KumiteError` if this skeleton has none."""
+        try:
+            return self.roles[role]
+        except KeyError:
+            raise KumiteError(
+                f"the skeleton has no joint for {role!r} (it has {', '.join(self.roles) or 'none'})"
+            ) from None
+
+    def children(self, joint: int) -> list[int]:
+        return np.flatnonzero(self.parents == joint).tolist()
+
+    def chain(self, ancestor: int, joint: int) -> list[int]:
+        """Joints from just below ``ancestor`` down to ``joint``."""
+        path = []
+        while joint != ancestor:
+            if joint == NO_PARENT:
+                raise KumiteError("skeleton: no such chain")
+            path.append(joint)
+            joint = int(self.parents[joint])
+        return path[::-1]
+
+    @cached_property
+    def rest_positions(self) -> np.ndarray:
+        """Joint positions [J, 3] with no joint turned and the root at the origin."""
+        out = np.zeros((len(self), 3))
+        for j in range(1, len(self)):
+            out[j] = out[self.parents[j]] + self.offsets[j]
+        return out
+
+    def tip(self, role: str) -> tuple[int, np.ndarray]:
+        """The far end of a role's segment: the joint that carries it and the offset [3] from it.
+
+        The farthest End Site below the joint; without End Sites the farthest joint below; without
+        either, the bone carried on by half its length.
+        """
+        joint = self.joint(role)
+        below = [joint]
+        for j in range(joint + 1, len(self)):
+            if self.parents[j] in below:
+                below.append(j)
+        rest = self.rest_positions
+        ends = [(int(p), o) for p, o in zip(self.tip_parents, self.tip_offsets) if p in below]
+        ends = ends or [(j, np.zeros(3)) for j in below[1:]]
+        if not ends:
+            return joint, 0.5 * self.offsets[joint]
+        far = max(ends, key=lambda e: float(np.linalg.norm(rest[e[0]] + e[1] - rest[joint])))
+        return far[0], np.array(far[1])
+
+    @cached_property
+    def lateral_axis(self) -> np.ndarray:
+        """Unit vector [3] from the right to the left hip in the pelvis' own axes."""
+        rest = self.rest_positions
+        v = rest[self.joint("left_thigh")] - rest[self.joint("right_thigh")]
+        v = v * np.array([1.0, 0.0, 1.0])
+        n = np.linalg.norm(v)
+        return v / n if n > 1e-9 else np.array([1.0, 0.0, 0.0])
+
+    @cached_property
+    def mirror_joints(self) -> np.ndarray:
+        """For every joint [J] the one on the other side (itself on the midline)."""
+        other = np.arange(len(self))
+        for part in (*ARM_ROLES, *LEG_ROLES):
+            a, b = self.roles.get(f"left_{part}"), self.roles.get(f"right_{part}")
+            while a is not None and b is not None and a != b and NO_PARENT not in (a, b):
+                other[a], other[b] = b, a
+                a, b = int(self.parents[a]), int(self.parents[b])
+        index = {n: j for j, n in enumerate(self.names)}
+        for j, name in enumerate(self.names):
+            for left, right in (("Left", "Right"), ("left", "right"), ("l", "r"), ("L", "R")):
+                if other[j] == j and name.startswith(left):
+                    k = index.get(right + name[len(left) :])
+                    if k is not None and other[k] == k:
+                        other[j], other[k] = k, j
+        return other
+
+
+@dataclass(frozen=True)
+class Clip:
+    """One take: frame k is at k / fps seconds."""
+
+    name: str
+    skeleton: Skeleton
+    fps: float
+    root_position: np.ndarray  # [F, 3] m
+    wxyz: np.ndarray  # [F, J, 4] each joint's rotation from its parent's axes; the root's from world
+    notes: tuple[str, ...] = ()  # what was inferred or repaired on the way in
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "root_position", _frozen(self.root_position, np.float64))
+        put(self, "wxyz", _frozen(self.wxyz, np.float64))
+        frames = len(self.root_position)
+        if self.root_position.shape != (frames, 3):
+            raise KumiteError(
+                f"{self.name}: root_position {self.root_position.shape}, expected [F, 3]"
+            )
+        if self.wxyz.shape != (frames, len(self.skeleton), 4):
+            raise KumiteError(
+                f"{self.name}: wxyz {self.wxyz.shape}, expected {(frames, len(self.skeleton), 4)}"
+            )
+        if frames == 0:
+            raise KumiteError(f"{self.name}: no frames")
+        if not (np.isfinite(self.fps) and self.fps > 0):
+            raise KumiteError(f"{self.name}: {self.fps} frames a second, expected more than 0")
+
+    def __len__(self) -> int:
+        return len(self.root_position)
+
+    @property
+    def seconds(self) -> float:
+        return len(self) / self.fps
+
+
+@dataclass(frozen=True)
+class ClipSet:
+    """Clips of one skeleton at one rate, end to end."""
+
+    skeleton: Skeleton
+    fps: float
+    names: tuple[str, ...]  # C
+    clip_start: np.ndarray  # [C + 1] int64, first frame of each clip, then F
+    root_position: np.ndarray  # [F, 3] m
+    wxyz: np.ndarray  # [F, J, 4]
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "names", tuple(self.names))
+        put(self, "clip_start", _frozen(self.clip_start, np.int64))
+        put(self, "root_position", _frozen(self.root_position, np.float64))
+        put(self, "wxyz", _frozen(self.wxyz, np.float64))
+        frames = len(self.root_position)
+        if self.clip_start.shape != (len(self.names) + 1,) or len(self.names) == 0:
+            raise KumiteError("clip set: expected one start a clip and the end")
+        if self.clip_start[0] != 0 or self.clip_start[-1] != frames:
+            raise KumiteError("clip set: clip_start must run from 0 to F")
+        if np.any(np.diff(self.clip_start) <= 0):
+            raise KumiteError("clip set: every clip needs at least one frame")
+        if self.wxyz.shape != (frames, len(self.skeleton), 4):
+            raise KumiteError(f"clip set: wxyz {self.wxyz.shape} does not fit the skeleton")
+
+    def __len__(self) -> int:
+        return len(self.root_position)
+
+    @property
+    def seconds(self) -> float:
+        return len(self) / self.fps
+
+    def clip(self, index: int) -> Clip:
+        a, b = self.clip_start[index], self.clip_start[index + 1]
+        return Clip(
+            self.names[index], self.skeleton, self.fps, self.root_position[a:b], self.wxyz[a:b]
+        )
+
+    def __iter__(self) -> Iterator[Clip]:
+        return (self.clip(i) for i in range(len(self.names)))
+
+    @cached_property
+    def clip_of_frame(self) -> np.ndarray:
+        """The clip [F] int32 that each frame belongs to."""
+        return np.repeat(np.arange(len(self.names), dtype=np.int32), np.diff(self.clip_start))
+
+    @cached_property
+    def world(self) -> tuple[np.ndarray, np.ndarray]:
+        """Joint positions [F, J, 3] and world rotations [F, J, 4] of every frame."""
+        return forward_kinematics(self.skeleton, self.root_position, self.wxyz)
+
+    @cached_property
+    def facing(self) -> np.ndarray:
+        """The facing frame [F, 3] (x, z, yaw) of every frame."""
+        return facing_frame(self.skeleton, self.root_position, self.wxyz)
+
+
+def forward_kinematics(
+    skeleton: Skeleton, root_position: np.ndarray, wxyz: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Joint positions [F, J, 3] and world rotations [F, J, 4] of poses [F, 3], [F, J, 4]."""
+    root_position = np.ascontiguousarray(root_position, dtype=np.float64)
+    wxyz = np.ascontiguousarray(wxyz, dtype=np.float64)
+    position = np.empty((*wxyz.shape[:2], 3))
+    world = np.empty(wxyz.shape)
+    pose_kernels.forward_kinematics(
+        skeleton.parents, skeleton.offsets, root_position, wxyz, position, world
+    )
+    return position, world
+
+
+def tip_positions(
+    skeleton: Skeleton, role: str, position: np.ndarray, world_wxyz: np.ndarray
+) -> np.ndarray:
+    """World positions [..., 3] of a role's far end, from world poses [..., J, 3], [..., J, 4]."""
+    joint, offset = skeleton.tip(role)
+    return position[..., joint, :] + rotation.rotate(world_wxyz[..., joint, :], offset)
+
+
+def facing_frame(skeleton: Skeleton, root_position: np.ndarray, wxyz: np.ndarray) -> np.ndarray:
+    """Planar facing frames [F, 3] (x, z, yaw): below the pelvis, at right angles to the hips.
+
+    Falls back to the last clear direction where the hips' axis is nearly upright.
+    """
+    pelvis = skeleton.joint("pelvis")
+    q = wxyz[..., 0, :]
+    p = np.asarray(root_position, dtype=np.float64)
+    for j in skeleton.chain(0, pelvis):
+        p = p + rotation.rotate(q, skeleton.offsets[j])
+        q = rotation.multiply(q, wxyz[..., j, :])
+    lateral = rotation.rotate(q, skeleton.lateral_axis)
+    yaw = np.arctan2(-lateral[..., 2], lateral[..., 0])
+    clear = np.hypot(lateral[..., 0], lateral[..., 2]) > 0.1
+    if not np.all(clear) and np.any(clear):
+        last = np.maximum.accumulate(np.where(clear, np.arange(len(yaw)), -1))
+        last[last < 0] = np.flatnonzero(clear)[0]
+        yaw = yaw[last]
+    return np.stack([p[..., 0], p[..., 2], yaw], axis=-1)
+
+
+def resample(clip: Clip, fps: float) -> Clip:
+    """The clip at another rate: positions linearly, rotations along the shortest arc."""
+    if not (np.isfinite(fps) and fps > 0):
+        raise KumiteError(f"{clip.name}: cannot resample to {fps} frames a second")
+    if fps == clip.fps:
+        return clip
+    count = int(np.floor((len(clip) - 1) * fps / clip.fps + 1e-6)) + 1
+    at = np.minimum(np.arange(count) * (clip.fps / fps), len(clip) - 1)
+    i = np.minimum(at.astype(np.int64), max(len(clip) - 2, 0))
+    t = at - i
+    k = np.minimum(i + 1, len(clip) - 1)
+    root = clip.root_position[i] * (1 - t)[:, None] + clip.root_position[k] * t[:, None]
+    on_frame = t < 1e-9
+    wxyz = np.where(
+        on_frame[:, None, None],
+        clip.wxyz[i],
+        rotation.slerp(clip.wxyz[i], clip.wxyz[k], t[:, None]),
+    )
+    return Clip(clip.name, clip.skeleton, fps, root, wxyz, clip.notes)
+
+
+def mirror(clip: Clip, name: str | None = None) -> Clip:
+    """The clip seen in a mirror: left and right change places, x changes sign."""
+    flip = np.array([1.0, 1.0, -1.0, -1.0])
+    wxyz = clip.wxyz[:, clip.skeleton.mirror_joints] * flip
+    root = clip.root_position * np.array([-1.0, 1.0, 1.0])
+    return Clip(name or f"{clip.name}_mirrored", clip.skeleton, clip.fps, root, wxyz, clip.notes)
+
+
+def check(clip: Clip) -> list[str]:
+    """Everything that looks wrong with a clip's data, at once; empty when nothing does."""
+    problems = []
+    bad = ~np.isfinite(clip.root_position).all(axis=1) | ~np.isfinite(clip.wxyz).all(axis=(1, 2))
+    if bad.any():
+        return [f"{clip.name}: frame {int(np.argmax(bad))} holds values that are not finite"]
+    off = np.abs(np.linalg.norm(clip.wxyz, axis=-1) - 1).max()
+    if off > 1e-6:
+        problems.append(f"{clip.name}: quaternions are not unit length (off by {off:.2g})")
+    if len(clip) > 1:
+        speed = np.linalg.norm(np.diff(clip.root_position, axis=0), axis=1) * clip.fps
+        if speed.max() > 15:
+            k = int(np.argmax(speed))
+            problems.append(f"{clip.name}: the root moves at {speed[k]:.0f} m/s after frame {k}")
+    return problems
+
+
+def concatenate(clips: Sequence[Clip], fps: float | None = None) -> ClipSet:
+    """Clips of one skeleton as a set, resampled to ``fps`` (the lowest rate among them by default).
+
+    Errors: no clips; two skeletons (named, with the first joint that differs).
+    """
+    if not clips:
+        raise KumiteError("no clips to put together")
+    first = clips[0]
+    for clip in clips[1:]:
+        if not first.skeleton.same_as(clip.skeleton):
+            raise KumiteError(
+                f"two skeletons in one library: {first.name} and {clip.name} differ "
+                f"{_first_difference(first.skeleton, clip.skeleton)}; expected one skeleton"
+            )
+    rate = fps or min(c.fps for c in clips)
+    names = [c.name for c in clips]
+    if len(set(names)) != len(names):
+        twice = sorted({n for n in names if names.count(n) > 1})
+        raise KumiteError(f"clip names used twice: {', '.join(twice)}")
+    same = [resample(c, rate) for c in clips]
+    return ClipSet(
+        first.skeleton,
+        rate,
+        tuple(names),
+        np.concatenate([[0], np.cumsum([len(c) for c in same])]),
+        np.concatenate([c.root_position for c in same]),
+        np.concatenate([c.wxyz for c in same]),
+    )
+
+
+def _first_difference(a: Skeleton, b: Skeleton) -> str:
+    if len(a) != len(b):
+        return f"in size ({len(a)} and {len(b)} joints)"
+    for j, (m, n) in enumerate(zip(a.names, b.names)):
+        if m != n:
+            return f"at joint {j} ({m!r} and {n!r})"
+        if j and a.parents[j] != b.parents[j]:
+            return f"at {m!r} (another parent)"
+        if j and not np.allclose(a.offsets[j], b.offsets[j], atol=1e-3):
+            gap = float(np.linalg.norm(a.offsets[j] - b.offsets[j]))
+            return f"at {m!r} (bone offsets {gap * 100:.1f} cm apart)"
+    return "nowhere"

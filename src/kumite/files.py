@@ -1,0 +1,81 @@
+"""Files of ours: safetensors with a JSON header, versioned, written whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from safetensors import SafetensorError
+from safetensors.numpy import load as load_tensors
+from safetensors.numpy import save as save_tensors
+
+from kumite.errors import KumiteError
+
+
+@contextlib.contextmanager
+def writing(path: Path | str) -> Iterator[Path]:
+    """A temporary path beside ``path``, renamed onto it at the end; removed if anything fails."""
+    path = Path(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(
+            prefix=f".{path.name}.", suffix=path.suffix, dir=path.parent
+        )
+        os.close(handle)
+    except OSError as error:
+        raise KumiteError(f"{path}: cannot be written ({error.strerror})") from None
+    temporary = Path(name)
+    try:
+        yield temporary
+        mask = os.umask(0)
+        os.umask(mask)
+        temporary.chmod(0o666 & ~mask)
+        temporary.replace(path)
+    except OSError as error:
+        raise KumiteError(f"{path}: cannot be written ({error.strerror})") from None
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def save(
+    path: Path | str, kind: str, version: int, header: Mapping[str, Any], arrays: dict[str, Any]
+) -> None:
+    """Write arrays and a JSON header. The same content gives the same bytes."""
+    meta = {"kumite": kind, "version": str(version), "header": json.dumps(header, sort_keys=True)}
+    tensors = {k: np.ascontiguousarray(v) for k, v in sorted(arrays.items())}
+    with writing(path) as temporary:
+        temporary.write_bytes(save_tensors(tensors, metadata=meta))
+
+
+def load(path: Path | str, kind: str, version: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """The header and arrays of a file that :func:`save` wrote.
+
+    Errors: missing, damaged, another kind of file, another version.
+    """
+    path = Path(path)
+    try:
+        blob = path.read_bytes()
+    except OSError as error:
+        raise KumiteError(f"{path}: cannot be read ({error.strerror})") from None
+    try:
+        size = int.from_bytes(blob[:8], "little")
+        meta = json.loads(blob[8 : 8 + size])["__metadata__"]
+        found, number, header = meta["kumite"], meta["version"], json.loads(meta["header"])
+    except (ValueError, KeyError, TypeError, MemoryError, OverflowError):
+        raise KumiteError(f"{path}: damaged, or not a file of Kumite's; expected a {kind}") from None
+    if found != kind:
+        raise KumiteError(f"{path}: this is a {found}; expected a {kind}")
+    if number != str(version):
+        raise KumiteError(
+            f"{path}: {kind} of version {number}; this Kumite reads version {version}: build it again"
+        )
+    try:
+        return header, load_tensors(blob)
+    except (SafetensorError, ValueError, KeyError) as error:
+        raise KumiteError(f"{path}: damaged {kind} ({error})") from None
