@@ -1,0 +1,94 @@
+"""What can be watched: the live scene and the recording answer to the same few names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from kumite.clip import Skeleton
+from kumite.scene.recording import Event, Recording
+
+
+@dataclass
+class SceneObject:
+    """A thing in the scene that is no character: the target to hit."""
+
+    name: str
+    position: np.ndarray  # [3] m, where it is now
+    radius: float  # m
+    draggable: bool = False
+
+
+class Stage(Protocol):
+    """A scene that moves on one frame at a time."""
+
+    title: str
+    fps: float
+    skeleton: Skeleton
+    names: tuple[str, ...]  # K
+    seed: int
+    frame: int  # frames since the start
+    root_position: np.ndarray  # [K, 3] m, now
+    wxyz: np.ndarray  # [K, J, 4], now
+    objects: Sequence[SceneObject]
+    events: Sequence[Event]  # everything so far, oldest first
+
+    def step(self) -> bool:
+        """Move on one frame; False when there is no next one."""
+        ...
+
+    def reset(self, seed: int) -> None:
+        """Start again."""
+        ...
+
+    def move_object(self, name: str, position: np.ndarray) -> None:
+        """Put an object somewhere; the characters see it from the next frame on."""
+        ...
+
+
+class Playback:
+    """A recording on the stage."""
+
+    def __init__(self, recording: Recording) -> None:
+        self.recording = recording
+        self.title = recording.scene
+        self.fps = recording.fps
+        self.skeleton = recording.skeleton
+        self.names = recording.names
+        self.seed = int(recording.settings.get("seed", 0))
+        radii = recording.settings.get("object_radius", {})
+        self.objects = [
+            SceneObject(n, np.zeros(3), float(radii.get(n, 0.1))) for n in recording.objects
+        ]
+        self.reset(self.seed)
+
+    def _show(self) -> None:
+        self.root_position = self.recording.root_position[self.frame].astype(np.float64)
+        self.wxyz = self.recording.wxyz[self.frame].astype(np.float64)
+        for o, thing in enumerate(self.objects):
+            thing.position = self.recording.object_position[self.frame, o].astype(np.float64)
+
+    def step(self) -> bool:
+        if self.frame + 1 >= len(self.recording):
+            return False
+        self.frame += 1
+        self._show()
+        return True
+
+    def reset(self, seed: int) -> None:
+        self.frame = 0
+        self._show()
+
+    def seek(self, frame: int) -> None:
+        self.frame = int(np.clip(frame, 0, len(self.recording) - 1))
+        self._show()
+
+    def move_object(self, name: str, position: np.ndarray) -> None:
+        """Nothing can be moved in a recording."""
+
+    @property
+    def events(self) -> list[Event]:
+        return [e for e in self.recording.events if e.frame <= self.frame]
