@@ -1,0 +1,152 @@
+"""Things on the stage that are no bodies: targets with a handle to drag, and bursts of hits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import viser
+
+from kumite.scene.stage import SceneObject
+from kumite.studio.palette import RGB, mix
+from kumite.studio.ring import STAGE
+
+TARGET_COLOUR: RGB = (246, 196, 60)
+STRUCK_COLOUR: RGB = (255, 255, 255)
+BURSTS = 6  # at once
+BURST_SECONDS = 0.35
+FLASH_SECONDS = 0.25
+SETTLE_HALFLIFE = 0.4  # s; the handle rests where the object hangs, not where it swings
+
+
+class Targets:
+    """A sphere for every object, and a gizmo at each one that can be dragged."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        objects: Sequence[SceneObject],
+        moved: Callable[[str, np.ndarray], None],
+    ) -> None:
+        self._objects = tuple(o.name for o in objects)
+        self._spheres = [
+            server.scene.add_icosphere(
+                f"{STAGE}/object/{i}",
+                radius=o.radius,
+                color=TARGET_COLOUR,
+                subdivisions=3,
+                position=o.position,
+            )
+            for i, o in enumerate(objects)
+        ]
+        self._gizmos: dict[int, viser.TransformControlsHandle] = {}
+        self._held: set[int] = set()
+        self._flash = np.zeros(len(objects))  # s left
+        for i, o in enumerate(objects):
+            if o.draggable:
+                self._gizmos[i] = self._add_gizmo(server, i, o, moved)
+
+    def _add_gizmo(
+        self,
+        server: viser.ViserServer,
+        index: int,
+        thing: SceneObject,
+        moved: Callable[[str, np.ndarray], None],
+    ) -> viser.TransformControlsHandle:
+        gizmo = server.scene.add_transform_controls(
+            f"{STAGE}/gizmo/{index}",
+            scale=gizmo_scale(thing.radius),
+            disable_rotations=True,
+            depth_test=False,
+            position=thing.position,
+        )
+
+        @gizmo.on_drag_start
+        def _(_: viser.TransformControlsEvent) -> None:
+            self._held.add(index)
+
+        @gizmo.on_drag_end
+        def _(_: viser.TransformControlsEvent) -> None:
+            self._held.discard(index)
+
+        @gizmo.on_update
+        def _(event: viser.TransformControlsEvent) -> None:
+            moved(thing.name, np.array(event.target.position, dtype=np.float64))
+
+        return gizmo
+
+    @property
+    def held(self) -> bool:
+        """Whether somebody is dragging: the ground must not slide away under the pointer."""
+        return bool(self._held)
+
+    def strike(self, name: str) -> None:
+        """Flash an object that was hit."""
+        if name in self._objects:
+            self._flash[self._objects.index(name)] = FLASH_SECONDS
+
+    def draw(self, position: np.ndarray, seconds: float) -> None:
+        """Put the objects at ``position`` [O, 3] m, ``seconds`` of wall time after the last."""
+        left = 0.5 ** (seconds / SETTLE_HALFLIFE)
+        for i, sphere in enumerate(self._spheres):
+            sphere.position = position[i]
+            if self._flash[i] > 0:
+                self._flash[i] = max(self._flash[i] - seconds, 0.0)
+                sphere.color = mix(TARGET_COLOUR, STRUCK_COLOUR, self._flash[i] / FLASH_SECONDS)
+            gizmo = self._gizmos.get(i)
+            if gizmo is not None and i not in self._held:
+                gizmo.position = position[i] + (np.asarray(gizmo.position) - position[i]) * left
+
+
+def gizmo_scale(radius: float) -> float:
+    """Length [m] of a gizmo's arrows around an object: out of the sphere, in reach of the mouse."""
+    return max(3.0 * radius, 0.3)
+
+
+class Bursts:
+    """Flashes at the places where blows land: a ball that grows and fades."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._balls = [
+            server.scene.add_icosphere(
+                f"{STAGE}/burst/{i}",
+                radius=1.0,
+                color=(255, 236, 170),
+                opacity=0.8,
+                subdivisions=2,
+                visible=False,
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+            for i in range(BURSTS)
+        ]
+        self._age = np.full(BURSTS, np.inf)  # s
+        self._size = np.zeros(BURSTS)  # m
+
+    def add(self, position: Sequence[float], speed: float) -> None:
+        """A burst at ``position`` [3] m; faster blows [m/s] make larger ones."""
+        i = int(np.argmax(self._age))
+        self._age[i] = 0.0
+        self._size[i] = float(np.clip(0.07 + 0.012 * speed, 0.07, 0.2))
+        self._balls[i].position = np.asarray(position, dtype=np.float64)
+
+    def clear(self) -> None:
+        """No burst outlives a restart."""
+        self._age[:] = BURST_SECONDS
+        self.draw(0.0)
+
+    def draw(self, seconds: float) -> bool:
+        """Age by ``seconds``; True while any is to be seen."""
+        for i, ball in enumerate(self._balls):
+            if not np.isfinite(self._age[i]):
+                continue
+            t = self._age[i] / BURST_SECONDS
+            ball.visible = t < 1.0
+            if t < 1.0:
+                size = float(self._size[i] * (0.45 + 0.55 * np.sqrt(t)))
+                ball.scale = size
+                ball.opacity = float(0.85 * (1.0 - t))
+                self._age[i] += seconds
+            else:
+                self._age[i] = np.inf
+        return bool(np.any(np.isfinite(self._age)))

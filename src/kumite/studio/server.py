@@ -1,0 +1,118 @@
+"""The web server behind the studio: where it listens, and what it never does.
+
+viser listens on every interface by default, prints a banner, tries a thousand ports on any error
+and offers a public tunnel. The studio listens where it is told and nowhere else, says one line,
+and refuses the tunnel.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ipaddress
+import logging
+import socket
+from collections.abc import Iterator
+
+import rich
+import viser
+
+from kumite.errors import KumiteError
+
+PORTS_TRIED = 100
+
+
+class LocalServer(viser.ViserServer):
+    """A viser server that cannot be put on the public internet from its own page."""
+
+    def request_share_url(self, verbose: bool = True) -> str | None:
+        """Refused: any page that reaches the socket can ask for a tunnel, not only the user."""
+        return None
+
+
+@contextlib.contextmanager
+def quiet_viser() -> Iterator[None]:
+    """Without viser's banner and farewell, which go through rich's shared console."""
+    console = rich.get_console()
+    before = console.quiet
+    console.quiet = True
+    try:
+        yield
+    finally:
+        console.quiet = before
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine can reach ``host``."""
+    try:
+        found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
+    except OSError:
+        return False
+    return all(ipaddress.ip_address(str(f[4][0]).split("%")[0]).is_loopback for f in found)
+
+
+def _bind_error(host: str, port: int) -> OSError | None:
+    """Why ``host:port`` cannot be listened on, or None."""
+    try:
+        family, kind, proto, _, address = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+        with socket.socket(family, kind, proto) as probe:
+            # As the server itself does: a port in TIME_WAIT is free.
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(address)
+            probe.listen(1)
+    except OSError as error:
+        return error
+    return None
+
+
+def free_port(host: str, port: int | None, *, strict: bool = False) -> int:
+    """The first free port from ``port`` on, or 0 (any) for None and 0.
+
+    Errors: a host that is not this machine's; with ``strict`` a port that is taken; none free.
+    """
+    if port is not None and not 0 <= port <= 65535:
+        raise KumiteError(f"port {port}: expected 0 (any) to 65535")
+    error = _bind_error(host, 0)
+    if error is not None:
+        raise KumiteError(f"host {host!r}: cannot listen there ({error.strerror or error})")
+    if not port:
+        return 0
+    last = port if strict else min(port + PORTS_TRIED - 1, 65535)
+    for candidate in range(port, last + 1):
+        error = _bind_error(host, candidate)
+        if error is None:
+            return candidate
+    raise KumiteError(
+        f"port {port} on {host} is taken ({error.strerror if error else 'in use'}); "
+        "choose another, or 0 for any free"
+    )
+
+
+def open_server(
+    host: str, port: int | None, label: str, *, strict: bool = False
+) -> viser.ViserServer:
+    """A running server; its real port is ``server.get_port()``. Errors as :func:`free_port`."""
+    wanted = free_port(host, port, strict=strict)
+    # A browser that closes its tab mid-handshake is no event worth a traceback.
+    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
+    with quiet_viser():
+        server = LocalServer(host=host, port=wanted, label=label, verbose=False)
+    if strict and wanted and server.get_port() != wanted:  # taken between the probe and the bind
+        close_server(server)
+        raise KumiteError(f"port {wanted} on {host} is taken; choose another, or 0 for any free")
+    return server
+
+
+def close_server(server: viser.ViserServer) -> None:
+    """Stop listening and let the pages go."""
+    with quiet_viser():
+        server.stop()
+
+
+def url_of(host: str, port: int) -> str:
+    """What to type into a browser on this machine."""
+    shown = {"0.0.0.0": "127.0.0.1", "::": "[::1]", "": "127.0.0.1"}.get(host, host)
+    if ":" in shown and not shown.startswith("["):
+        shown = f"[{shown}]"
+    return f"http://{shown}:{port}"

@@ -1,0 +1,344 @@
+"""The loop: steps the stage in time, draws what it shows, and lets the page interfere.
+
+One thread steps and draws. The page's callbacks come from viser's threads; they touch the stage
+under one lock and leave notes (``_redraw``, ``_rewound``) that the loop acts on.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import time
+import webbrowser
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from kumite.body import body_mesh
+from kumite.clip import LIMBS, forward_kinematics
+from kumite.errors import KumiteError
+from kumite.scene.recording import Event
+from kumite.scene.stage import Playback, Stage
+from kumite.studio import bodies, props, ring
+from kumite.studio.pace import Pace
+from kumite.studio.panel import FASTEST, SLOWEST, Control, Panel
+from kumite.studio.server import close_server, is_loopback, open_server, url_of
+from kumite.studio.wording import EventLog, place, struck
+
+MOST_DRAWN = 60.0  # pictures a second
+PANEL_PERIOD = 0.2  # s between updates of what is read, not watched
+IDLE_PERIOD = 0.25  # s between looks at a paused stage
+LONGEST_TICK = 0.1  # s; fades and the follow do not jump after a hiccup
+
+
+@dataclass
+class _Picture:
+    """What one drawing needs, copied from the stage under the lock."""
+
+    frame: int
+    root_position: np.ndarray  # [K, 3] m
+    wxyz: np.ndarray  # [K, J, 4]
+    objects: np.ndarray  # [O, 3] m
+    hits: list[Event] = field(default_factory=list)
+
+
+class Studio:
+    """A stage in the browser. Make it, :meth:`run` it, :meth:`close` it.
+
+    Errors: no body can be laid on the skeleton; a host that is not this machine's; with
+    ``strict_port`` a port that is taken (without, the next free one is used).
+    """
+
+    def __init__(
+        self,
+        stage: Stage,
+        *,
+        host: str = "127.0.0.1",
+        port: int | None = 8080,
+        strict_port: bool = False,
+    ) -> None:
+        self.stage = stage
+        self._lock = threading.RLock()
+        self._stop = threading.Event()
+        self._wake = threading.Event()
+        self._redraw = self._rewound = True
+        self._playing = True
+        self._ended = False
+        self._hits: list[Event] = []
+        self._pace = Pace(stage.fps)
+        self._log = EventLog(stage.names)
+        mesh = body_mesh(stage.skeleton)
+        self.server = open_server(host, port, stage.title, strict=strict_port)
+        self.url = url_of(host, self.server.get_port())
+        try:
+            self._build(mesh)
+        except BaseException:
+            self.close()
+            raise
+
+    def _build(self, mesh: bodies.BodyMesh) -> None:
+        stage, server = self.stage, self.server
+        self._follow = ring.Follow(ring.build(server))
+        self._bodies = bodies.show_bodies(server, stage.skeleton, mesh, stage.names)
+        self._targets = props.Targets(server, stage.objects, self.move_object)
+        self._bursts = props.Bursts(server)
+        self._panel = Panel(
+            server,
+            self,
+            title=stage.title,
+            seed=stage.seed,
+            frames=len(stage.recording) if isinstance(stage, Playback) else None,
+            fps=stage.fps,
+            controls=[c for c in getattr(stage, "controls", ()) if isinstance(c, Control)],
+        )
+        picture = self._look()
+        self._follow.jump(_midpoint(picture))
+        ring.aim(server, _in_view(picture), self._follow.centre)
+        self._drawn_at = self._panel_at = time.perf_counter()
+        with server.atomic():
+            self._draw(picture, 0.0)
+        server.on_client_connect(lambda _: self._poke())
+
+    # What the page asks for; any thread.
+
+    def _poke(self) -> None:
+        self._redraw = True
+        self._wake.set()
+
+    @property
+    def playing(self) -> bool:
+        """Whether the stage moves by itself."""
+        return self._playing
+
+    def toggle(self) -> None:
+        """Play or pause; at the end, play again from the start."""
+        with self._lock:
+            if self._ended:
+                self.restart()
+                self._playing = True
+            else:
+                self._playing = not self._playing
+            self._pace.restart()
+        self._poke()
+
+    def step_once(self) -> None:
+        """Pause, and move on one frame."""
+        with self._lock:
+            self._playing = False
+            self._step(1)
+        self._poke()
+
+    def restart(self, seed: int | None = None) -> None:
+        """From the start, with ``seed`` or the stage's own."""
+        with self._lock:
+            self.stage.reset(self.stage.seed if seed is None else seed)
+            self._after_jump()
+            self._rewound = True
+        self._poke()
+
+    def seek(self, frame: int) -> None:
+        """Jump to a frame; a live stage cannot."""
+        with self._lock:
+            if isinstance(self.stage, Playback):
+                self.stage.seek(frame)
+                self._after_jump()
+        self._poke()
+
+    def _after_jump(self) -> None:
+        self._ended = False
+        self._hits.clear()
+        self._log.rewind()
+        self._log.update(self.stage.events, self.stage.frame)
+        self._pace.restart()
+
+    def set_speed(self, speed: float) -> None:
+        """Seconds of the scene in a second of wall time, 0.1 to 4."""
+        with self._lock:
+            self._pace.speed = float(np.clip(speed, SLOWEST, FASTEST))
+        self._wake.set()
+
+    def set_follow(self, on: bool) -> None:
+        """Keep the fighters' midpoint in the middle of the picture, or not."""
+        self._follow.on = on
+        self._poke()
+
+    def show_decisions(self, on: bool) -> None:
+        """List decisions among the events."""
+        with self._lock:
+            self._log.show_quiet = on
+        self._poke()
+
+    def tune(self, control: Control, value: float) -> None:
+        """Set one of the stage's controls."""
+        with self._lock:
+            control.set(value)
+
+    def move_object(self, name: str, position: np.ndarray) -> None:
+        """Put an object at ``position`` [3] m."""
+        with self._lock:
+            self.stage.move_object(name, position)
+        self._poke()
+
+    def stop(self) -> None:
+        """Let :meth:`run` return."""
+        self._stop.set()
+        self._wake.set()
+
+    def close(self) -> None:
+        """Stop, and free the port."""
+        self.stop()
+        close_server(self.server)
+
+    # The loop; one thread.
+
+    def run(self, seconds: float | None = None) -> None:
+        """Play until :meth:`stop`, or for ``seconds`` of wall time."""
+        end = None if seconds is None else time.perf_counter() + seconds
+        self._pace.restart()
+        while not self._stop.is_set():
+            moving = self._tick()
+            pause = self._pace.wait() if self._playing else IDLE_PERIOD
+            pause = min(pause, 1 / 30) if moving else pause
+            if end is not None:
+                left = end - time.perf_counter()
+                if left <= 0:
+                    break
+                pause = min(pause, left)
+            self._wake.wait(pause)
+            self._wake.clear()
+
+    def _step(self, frames: int) -> None:
+        for _ in range(frames):
+            if not self.stage.step():
+                self._ended, self._playing = True, False
+                break
+        fresh = self._log.update(self.stage.events, self.stage.frame)
+        self._hits += [e for e in fresh if e.kind == "hit"]
+        self._redraw = True
+
+    def _tick(self) -> bool:
+        """Step what is due and draw it; True while something fades or slides on its own."""
+        with self._lock:
+            if self._playing and (due := self._pace.take()):
+                self._step(due)
+            now = time.perf_counter()
+            seconds = now - self._drawn_at
+            if not self._redraw and not self._animating:
+                return False
+            if seconds < 1 / MOST_DRAWN:
+                return True
+            if not self.server.get_clients():
+                self._hits.clear()
+                return False  # _redraw stays set: whoever comes is shown the latest
+            self._redraw, rewound, self._rewound = False, self._rewound, False
+            picture = self._look()
+        with self.server.atomic():
+            if rewound:
+                self._follow.jump(_midpoint(picture))
+                self._bursts.clear()
+            self._draw(picture, min(seconds, LONGEST_TICK))
+        self.server.flush()
+        self._drawn_at = now
+        return self._animating
+
+    def _look(self) -> _Picture:
+        stage = self.stage
+        hits, self._hits = self._hits, []
+        return _Picture(
+            stage.frame,
+            np.array(stage.root_position, dtype=np.float64),
+            np.array(stage.wxyz, dtype=np.float64),
+            np.array([o.position for o in stage.objects], dtype=np.float64).reshape(-1, 3),
+            hits,
+        )
+
+    def _draw(self, picture: _Picture, seconds: float) -> None:
+        position, world = forward_kinematics(
+            self.stage.skeleton, picture.root_position, picture.wxyz
+        )
+        for hit in picture.hits:
+            self._show_hit(hit, position)
+        if not self._targets.held:
+            self._follow.update(_midpoint(picture), seconds)
+        self._bodies.draw(position, world, seconds)
+        self._targets.draw(picture.objects, seconds)
+        self._animating = self._bursts.draw(seconds)
+        now = time.perf_counter()
+        if now - self._panel_at >= PANEL_PERIOD or seconds == 0.0 or not self._playing:
+            self._panel_at = now
+            note = " · ended" if self._ended else "" if self._playing else " · paused"
+            self._panel.playing(self._playing)
+            with self._lock:
+                self._panel.show(self._log, picture.frame, note)
+
+    def _show_hit(self, hit: Event, position: np.ndarray) -> None:
+        whom, names = struck(hit), self.stage.names
+        if whom in names:
+            self._bodies.flash(names.index(whom))
+        elif whom is not None:
+            self._targets.strike(whom)
+        point = place(hit)
+        if point is None and hit.character in names:
+            # No place given: where the limb is that struck.
+            limb = str(hit.data.get("limb", ""))
+            joint = self.stage.skeleton.roles.get(limb) if limb in LIMBS else None
+            point = None if joint is None else position[names.index(hit.character), joint].tolist()
+        if point is not None:
+            speed = hit.data.get("speed")
+            self._bursts.add(point, float(speed) if isinstance(speed, int | float) else 5.0)
+
+
+def _in_view(picture: _Picture) -> np.ndarray:
+    """Points [N, 3] m that belong in the picture."""
+    return np.concatenate([picture.root_position, picture.objects])
+
+
+def _midpoint(picture: _Picture) -> np.ndarray:
+    """The middle [2] (x, z) of what goes on: of the fighters, or of one and the target."""
+    points = picture.root_position if len(picture.root_position) > 1 else _in_view(picture)
+    return points[:, [0, 2]].mean(axis=0)
+
+
+def serve(
+    stage: Stage,
+    *,
+    host: str = "127.0.0.1",
+    port: int | None = 8080,
+    open_browser: bool = True,
+    seconds: float | None = None,
+    strict_port: bool = False,
+    announce: Callable[[str], None] = print,
+) -> None:
+    """Show a stage in the browser until Ctrl-C, or for ``seconds``.
+
+    A taken port moves on to the next free one, and that is said; with ``strict_port`` it is an
+    error. ``port`` 0 or None takes any. Errors: as :class:`Studio`.
+    """
+    if seconds is not None and not seconds > 0:
+        raise KumiteError(f"{seconds} seconds of studio; expected more than 0")
+    studio = Studio(stage, host=host, port=port, strict_port=strict_port)
+    try:
+        found = studio.server.get_port()
+        if port and found != port:
+            announce(f"port {port} is taken; using {found}")
+        if not is_loopback(host):
+            announce(f"listening on {host}: others on the network can watch and interfere")
+        announce(f"studio: {studio.url}  (Ctrl-C ends)")
+        if open_browser:
+            _open_page(studio.url)
+        studio.run(seconds)
+    except KeyboardInterrupt:
+        announce("studio closed")
+    finally:
+        studio.close()
+
+
+def _open_page(url: str) -> None:
+    """In the user's browser, if there is a screen; a text browser would take the terminal."""
+    if sys.platform.startswith("linux") and not (
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    ):
+        return
+    threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
