@@ -1,1 +1,20 @@
-"""."""
+"""The motion graph: pose distance, transitions, components, the action table, the library file."""
+
+from kumite.graph.distance import PoseFeatures, pose_features
+from kumite.graph.library import Library, build_library, load_library, save_library
+from kumite.graph.table import ActionTable, fold
+from kumite.graph.transitions import Transitions, find_transitions, strongest_component
+
+__all__ = [
+    "ActionTable",
+    "Library",
+    "PoseFeatures",
+    "Transitions",
+    "build_library",
+    "find_transitions",
+    "fold",
+    "load_library",
+    "pose_features",
+    "save_library",
+    "strongest_component",
+]

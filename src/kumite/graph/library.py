@@ -1,0 +1,156 @@
+"""A library: clips, their notes and the action table, as one file."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kumite import files
+from kumite.annotate import Contacts, Strikes, find_contacts, find_strikes
+from kumite.clip import ClipSet, Skeleton
+from kumite.errors import KumiteError
+from kumite.graph.distance import pose_features
+from kumite.graph.table import ActionTable, fold
+from kumite.graph.transitions import (
+    LARGEST_SHARE,
+    PER_SECOND,
+    find_transitions,
+    strongest_component,
+)
+
+KIND = "library"
+VERSION = 1
+
+
+@dataclass(frozen=True)
+class Library:
+    """Everything a controller and a scene need of the captured motion."""
+
+    clips: ClipSet
+    contacts: Contacts
+    strikes: Strikes
+    table: ActionTable
+    report: dict[str, Any] = field(default_factory=dict)  # how it was built, JSON values
+
+    @cached_property
+    def digest(self) -> str:
+        """16 hex digits that name the content: what is computed from it is cached under them."""
+        h = hashlib.sha256(f"{VERSION}{self.clips.fps}{self.clips.skeleton.names}".encode())
+        for array in _arrays(self).values():
+            h.update(np.ascontiguousarray(array).tobytes())
+        return h.hexdigest()[:16]
+
+
+def build_library(
+    clips: ClipSet,
+    *,
+    event: str = "left",
+    per_second: float = PER_SECOND,
+    largest_share: float = LARGEST_SHARE,
+    progress: Callable[[str], None] = lambda stage: None,
+) -> Library:
+    """Notes, transitions, component and action table of a set of clips.
+
+    progress is told each stage as it begins. Errors: too few frames; no such contact event.
+    """
+    progress("finding contacts and effective hits")
+    contacts = find_contacts(clips)
+    strikes = find_strikes(clips)
+    progress("comparing poses")
+    features = pose_features(clips)
+    transitions = find_transitions(
+        clips,
+        contacts,
+        event=event,
+        per_second=per_second,
+        largest_share=largest_share,
+        features=features,
+    )
+    progress("folding the graph")
+    kept = strongest_component(clips, transitions)
+    table = fold(clips, transitions, kept)
+    jumps = table.join_cost[table.join_cost > 0]
+    report = {
+        "event": event,
+        "per_second": per_second,
+        "largest_share": largest_share,
+        "fps": clips.fps,
+        "frames": len(clips),
+        "frames_kept": int(kept.sum()),
+        "candidates": transitions.candidates,
+        "transitions": len(transitions),
+        "threshold": transitions.threshold,
+        "states": table.states,
+        "actions": table.actions,
+        "stretches": len(table.first),
+        "mean_action_s": float(table.duration[table.stretch].mean() / clips.fps),
+        "mean_join_cost": float(jumps.mean()) if len(jumps) else 0.0,
+        "hits": len(strikes),
+    }
+    return Library(clips, contacts, strikes, table, report)
+
+
+def _group(prefix: str, record: Any) -> dict[str, np.ndarray]:
+    return {f"{prefix}.{f.name}": getattr(record, f.name) for f in fields(record)}
+
+
+def _arrays(library: Library) -> dict[str, np.ndarray]:
+    clips = library.clips
+    return {
+        "clips.clip_start": clips.clip_start,
+        "clips.root_position": clips.root_position,
+        "clips.wxyz": clips.wxyz,
+        "skeleton.parents": clips.skeleton.parents,
+        "skeleton.offsets": clips.skeleton.offsets,
+        "skeleton.tip_parents": clips.skeleton.tip_parents,
+        "skeleton.tip_offsets": clips.skeleton.tip_offsets,
+        **_group("contacts", library.contacts),
+        **_group("strikes", library.strikes),
+        **_group("table", library.table),
+    }
+
+
+def save_library(path: Path | str, library: Library) -> None:
+    header = {
+        "clip_names": list(library.clips.names),
+        "fps": library.clips.fps,
+        "joint_names": list(library.clips.skeleton.names),
+        "roles": dict(library.clips.skeleton.roles),
+        "report": library.report,
+    }
+    files.save(path, KIND, VERSION, header, _arrays(library))
+
+
+def load_library(path: Path | str) -> Library:
+    """Errors: missing, damaged, another kind of file, another version."""
+    header, arrays = files.load(path, KIND, VERSION)
+
+    def part(prefix: str) -> dict[str, np.ndarray]:
+        dot = prefix + "."
+        return {k.removeprefix(dot): v for k, v in arrays.items() if k.startswith(dot)}
+
+    try:
+        skeleton = Skeleton(
+            names=tuple(header["joint_names"]), roles=header["roles"], **part("skeleton")
+        )
+        clips = ClipSet(
+            skeleton=skeleton,
+            fps=header["fps"],
+            names=tuple(header["clip_names"]),
+            **part("clips"),
+        )
+        return Library(
+            clips,
+            Contacts(**part("contacts")),
+            Strikes(**part("strikes")),
+            ActionTable(**part("table")),
+            header["report"],
+        )
+    except (KeyError, TypeError, ValueError, KumiteError) as error:
+        raise KumiteError(f"{path}: damaged library ({error})") from None

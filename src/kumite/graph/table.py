@@ -1,0 +1,104 @@
+"""The action table: what every controller plans on (Lee & Lee 2004, section 3).
+
+Nodes are *states*, frames with several ways out. An *action* goes from a state to the next one: it
+jumps to a frame (or simply goes on) and plays captured frames up to the next state. All actions
+that land on the same frame share one *stretch* of frames, because a join carries the facing frame
+of state i onto that of frame j − 1: what follows looks the same from wherever it was entered. So
+durations, displacements, rewards and values are kept once a stretch, and there are far fewer of
+them than actions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kumite.clip import ClipSet
+from kumite.errors import KumiteError
+from kumite.graph.transitions import Transitions
+from kumite.rotation import planar_compose, planar_inverse
+
+
+@dataclass(frozen=True)
+class ActionTable:
+    """N states, A actions in CSR by state, L stretches."""
+
+    state_frame: np.ndarray  # [N] int32
+    action_start: np.ndarray  # [N + 1] int32, actions of state s are action_start[s:s + 2]
+    stretch: np.ndarray  # [A] int32
+    join_cost: np.ndarray  # [A] float32, 0 where the capture simply goes on
+    first: np.ndarray  # [L] int32, first frame played
+    last: np.ndarray  # [L] int32, last frame played: the next state's frame
+    target: np.ndarray  # [L] int32, the state it ends in
+    displacement: np.ndarray  # [L, 3] (x, z, yaw) from the facing frame of first - 1 to that of last
+
+    @property
+    def duration(self) -> np.ndarray:
+        """Frames [L] that each stretch lasts."""
+        return self.last - self.first + 1
+
+    @property
+    def states(self) -> int:
+        return len(self.state_frame)
+
+    @property
+    def actions(self) -> int:
+        return len(self.stretch)
+
+    def actions_of(self, state: int) -> slice:
+        return slice(int(self.action_start[state]), int(self.action_start[state + 1]))
+
+    def state_of_action(self) -> np.ndarray:
+        """The state [A] that each action leaves."""
+        return np.repeat(np.arange(self.states, dtype=np.int32), np.diff(self.action_start))
+
+
+def fold(clips: ClipSet, transitions: Transitions, kept: np.ndarray) -> ActionTable:
+    """Fold chains of frames with one way out into actions (Lee & Lee 2004, figure 2).
+
+    kept [F] bool: a strongly connected component. A frame whose only way out is a jump is a state
+    with one action, so that every action is one range of frames. Errors: fewer than 2 states.
+    """
+    inside = kept[transitions.source] & kept[transitions.target]
+    source, target = transitions.source[inside], transitions.target[inside]
+    cost = transitions.cost[inside]
+    jump = target != source + 1
+    source, target, cost = source[jump], target[jump], cost[jump]
+
+    goes_on = kept.copy()
+    goes_on[:-1] &= kept[1:]
+    goes_on[-1] = False
+    goes_on[clips.clip_start[1:] - 1] = False
+    is_state = np.zeros(len(clips), dtype=bool)
+    is_state[source] = True
+    is_state &= kept
+    state_frame = np.flatnonzero(is_state).astype(np.int32)
+    if len(state_frame) < 2:
+        raise KumiteError(
+            f"too few frames for a graph: {int(kept.sum())} connected frames give "
+            f"{len(state_frame)} state(s); expected at least 2 (more or longer clips)"
+        )
+    simply = state_frame[goes_on[state_frame]]
+    source = np.concatenate([source, simply])
+    target = np.concatenate([target, simply + 1])
+    cost = np.concatenate([cost, np.zeros(len(simply), np.float32)])
+    order = np.lexsort((target, source))
+    source, target, cost = source[order], target[order], cost[order]
+
+    first, stretch = np.unique(target, return_inverse=True)
+    end = np.searchsorted(state_frame, first)
+    last = state_frame[end]
+    if np.any(clips.clip_of_frame[last] != clips.clip_of_frame[first]):
+        raise KumiteError("internal error: a stretch leaves its clip")  # kept is not a component
+    facing = clips.facing
+    return ActionTable(
+        state_frame,
+        np.searchsorted(source, np.append(state_frame, len(clips))).astype(np.int32),
+        stretch.astype(np.int32).ravel(),
+        cost.astype(np.float32),
+        first.astype(np.int32),
+        last.astype(np.int32),
+        end.astype(np.int32),
+        planar_compose(planar_inverse(facing[first - 1]), facing[last]),
+    )

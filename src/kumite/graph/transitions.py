@@ -1,0 +1,196 @@
+"""Where one captured motion may go on as another (Lee & Lee 2004, section 6, graph construction).
+
+A transition i → j: frame i resembles frame j − 1, and the same contact event happens at both. It
+is the local minimum of its neighbourhood, and among the best of the wanted number.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from kumite.annotate import Contacts
+from kumite.clip import ClipSet
+from kumite.errors import KumiteError, unknown
+from kumite.graph.distance import PoseFeatures, pose_features
+from kumite.kernels import distance as kernels
+
+EVENTS = {"left": (0,), "right": (1,), "both": (0, 1), "none": ()}
+"""Whose lift-off a join waits for; ``none`` joins anywhere."""
+PER_SECOND = 52.0  # wanted transitions per second of capture: the paper's 27,072 of 8 minutes
+LARGEST_SHARE = 0.2  # of the pairs at an event: the paper's share is 0.14
+FEWEST = 3  # ways in and out that a rare pose keeps at an event …
+STRETCH_LIMIT = 1.7  # … if they cost no more than this times the threshold
+_ROOM = 4096  # first guess of local minima a task
+
+
+@dataclass(frozen=True)
+class Transitions:
+    """X transitions: frame ``source`` may be followed by frame ``target``."""
+
+    source: np.ndarray  # [X] int32, i
+    target: np.ndarray  # [X] int32, j
+    cost: np.ndarray  # [X] float32, root of D(i, j - 1): about radians
+    threshold: float  # the largest cost accepted of any pose, rare ones apart
+    candidates: int  # pairs that met the contact condition (or local minima without one)
+
+    def __len__(self) -> int:
+        return len(self.source)
+
+
+def find_transitions(
+    clips: ClipSet,
+    contacts: Contacts,
+    *,
+    event: str = "left",
+    per_second: float = PER_SECOND,
+    largest_share: float = LARGEST_SHARE,
+    features: PoseFeatures | None = None,
+) -> Transitions:
+    """The best transitions, about ``per_second`` for each second of capture.
+
+    Errors: an unknown event; no such event in the clips.
+    """
+    if event not in EVENTS:
+        raise unknown("event", event, EVENTS)
+    if not per_second > 0:
+        raise KumiteError("per_second: expected more than 0 transitions a second")
+    features = features or pose_features(clips)
+    frames, group = _candidate_frames(clips, contacts, event)
+    if len(frames) < 2:
+        raise KumiteError(
+            f"too few frames for a graph: {len(clips)} frames in {len(clips.names)} clip(s) hold "
+            f"{len(frames)} {event}-foot lift-off(s); expected at least 2"
+        )
+    joined = np.zeros(len(frames), dtype=bool)
+    joined[1:] = (np.diff(frames) == 1) & (np.diff(clips.clip_of_frame[frames]) == 0)
+    wanted = max(1, round(per_second * clips.seconds))
+    a, b, d = _local_minima(features.take(frames), joined, group, wanted)
+    candidates = len(d)
+    if event != "none":
+        wanted = min(wanted, max(1, round(largest_share * candidates)))
+    order = np.argsort(d, kind="stable")
+    keep = order[:wanted]
+    if event != "none" and len(keep):
+        # A rare pose (a deep duck, a far punch) is unlike most others and would be lost: its few
+        # best ways in and out are kept, within reason.
+        near = d[order] < STRETCH_LIMIT**2 * d[keep[-1]]
+        few = near & ((_rank(a[order]) < FEWEST) | (_rank(b[order]) < FEWEST))
+        keep = np.union1d(keep, order[few])
+    keep = keep[np.lexsort((b[keep], a[keep]))]
+    if len(keep) == 0:
+        raise KumiteError("too few frames for a graph: no two poses are alike")
+    cost = np.sqrt(d[keep]).astype(np.float32)
+    return Transitions(
+        frames[a[keep]].astype(np.int32),
+        (frames[b[keep]] + 1).astype(np.int32),
+        cost,
+        float(np.sqrt(d[order[min(wanted, len(order)) - 1]])),
+        candidates,
+    )
+
+
+def _rank(key: np.ndarray) -> np.ndarray:
+    """How many equal keys come before each [P]."""
+    order = np.argsort(key, kind="stable")
+    first = np.searchsorted(key[order], key[order])
+    rank = np.empty(len(key), dtype=np.int64)
+    rank[order] = np.arange(len(key)) - first
+    return rank
+
+
+def _candidate_frames(
+    clips: ClipSet, contacts: Contacts, event: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Frames that may be joined [P] and the event at each [P]; never a clip's last frame."""
+    if event == "none":
+        last = np.zeros(len(clips), dtype=bool)
+        last[clips.clip_start[1:] - 1] = True
+        frames = np.flatnonzero(~last)
+        return frames, np.zeros(len(frames), dtype=np.int32)
+    lift_off = contacts.lift_off(clips.clip_start)
+    group = np.full(len(clips), -1, dtype=np.int32)
+    for foot in EVENTS[event]:
+        group[lift_off[:, foot]] = foot
+    frames = np.flatnonzero(group >= 0)
+    return frames, group[frames]
+
+
+def _local_minima(
+    features: PoseFeatures, joined: np.ndarray, group: np.ndarray, wanted: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """All local minima (a, b, D), or at least the ``wanted`` best of them where they are many."""
+    count = features.quaternion.shape[2]
+    tasks = (count + kernels.ROWS - 1) // kernels.ROWS
+    limit = np.float32(np.inf)
+    if count > 4000:
+        limit = _limit_from_sample(features, joined, group, wanted)
+    room = _ROOM
+    while True:
+        found_a = np.empty((tasks, room), dtype=np.int32)
+        found_b = np.empty((tasks, room), dtype=np.int32)
+        found_d = np.empty((tasks, room), dtype=np.float32)
+        counts = np.zeros(tasks, dtype=np.int64)
+        kernels.local_minima(
+            features.quaternion,
+            features.weight,
+            features.euclidean,
+            joined,
+            group,
+            limit,
+            found_a,
+            found_b,
+            found_d,
+            counts,
+        )
+        if counts.max() <= room:
+            if np.isinf(limit) or counts.sum() >= wanted:
+                used = np.arange(room)[None, :] < counts[:, None]
+                return found_a[used], found_b[used], found_d[used]
+            limit = np.float32(limit * 4)  # the sample was too hopeful
+        else:
+            room = int(counts.max())
+
+
+def _limit_from_sample(
+    features: PoseFeatures, joined: np.ndarray, group: np.ndarray, wanted: int
+) -> np.float32:
+    """A distance below which about twice the wanted number of local minima lies.
+
+    Measured on a few runs of rows spread over the poses, so that memory stays small.
+    """
+    count = features.quaternion.shape[2]
+    runs = np.linspace(0, count - 17, 24).astype(int)
+    rows = np.unique((runs[:, None] + np.arange(16)).ravel())
+    line = np.empty((16 + kernels.LANES, count), dtype=np.float32)
+    values = []
+    for start in runs:
+        kernels.distance_rows(
+            features.quaternion, features.weight, features.euclidean, start, start + 16, line
+        )
+        inner = line[1:15, 1:-1]
+        low = np.ones_like(inner, dtype=bool)
+        for dr in (-1, 0, 1):
+            for dc in (-1, 0, 1):
+                if dr or dc:
+                    low &= inner <= line[1 + dr : 15 + dr, 1 + dc : count - 1 + dc]
+        values.append(inner[low])
+    sample = np.concatenate(values)
+    expected = len(sample) * count / len(rows)
+    share = min(1.0, 2.0 * wanted / max(expected, 1.0))
+    return np.float32(np.quantile(sample, share)) if share < 1 else np.float32(np.inf)
+
+
+def strongest_component(clips: ClipSet, transitions: Transitions) -> np.ndarray:
+    """The frames [F] bool of the largest strongly connected component: no dead ends."""
+    follows = np.ones(len(clips), dtype=bool)
+    follows[clips.clip_start[1:] - 1] = False
+    step = np.flatnonzero(follows)
+    source = np.concatenate([step, transitions.source])
+    target = np.concatenate([step + 1, transitions.target])
+    graph = coo_array((np.ones(len(source), np.int8), (source, target)), shape=(len(clips),) * 2)
+    _, label = connected_components(graph.tocsr(), directed=True, connection="strong")
+    return label == np.argmax(np.bincount(label))
