@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from kumite import rotation
-from kumite.body.segments import Body, lay_body
-from kumite.body.stance import stand
+from kumite.body.boxer import make_surfaces
+from kumite.body.stance import Stance, stand
+from kumite.body.sweep import vertex_normals
 from kumite.clip import Skeleton
 from kumite.errors import KumiteError
 
@@ -69,11 +70,49 @@ def skin_vertices(
     return vertices, normals / np.maximum(length, 1e-12)
 
 
-def body_mesh(skeleton: Skeleton, body: Body | None = None) -> BodyMesh:
-    """The skin of a skeleton's body (laid on it by :func:`lay_body` unless given).
+def body_mesh(skeleton: Skeleton) -> BodyMesh:
+    """The skin of a boxer on any skeleton with the required roles; sizes follow from its bones.
 
-    Errors: roles that are missing; limbs without length.
+    Errors: :class:`KumiteError` for roles that are missing and limbs without length.
     """
-    from kumite.body.boxer import model
+    stance = stand(skeleton)
+    surfaces = sorted(make_surfaces(skeleton, stance), key=lambda s: ROLES.index(s.role))
+    start = np.cumsum([0, *(len(s.vertices) for s in surfaces)])
+    vertices = np.concatenate([s.vertices for s in surfaces])
+    normals = np.concatenate([vertex_normals(s.vertices, s.faces) for s in surfaces])
+    faces = np.concatenate([s.faces + at for s, at in zip(surfaces, start)])
+    joints, weights = _four_strongest(np.concatenate([s.weights for s in surfaces]))
+    role = np.concatenate([np.full(len(s.vertices), ROLES.index(s.role)) for s in surfaces])
+    vertices, normals = _unpose(skeleton, stance, vertices, normals, joints, weights)
+    return BodyMesh(vertices, faces, normals, joints, weights, role)
 
-    return model(skeleton, stand(skeleton), body or lay_body(skeleton))
+
+def _four_strongest(dense: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Joints and weights [V, 4] of dense weights [V, J], largest first, rows summing to 1."""
+    order = np.argsort(-dense, axis=1, kind="stable")[:, :4]
+    weights = np.take_along_axis(dense, order, axis=1)
+    weights = np.where(weights > 1e-3, weights, 0.0)
+    weights = weights / weights.sum(axis=1, keepdims=True)
+    return np.where(weights > 0, order, 0), weights
+
+
+def _unpose(
+    skeleton: Skeleton,
+    stance: Stance,
+    vertices: np.ndarray,
+    normals: np.ndarray,
+    joints: np.ndarray,
+    weights: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rest-pose vertices and normals [V, 3] that skinning carries onto the standing ones."""
+    turn = rotation.to_matrix(stance.wxyz)
+    shift = stance.position - np.einsum("jab,jb->ja", turn, skeleton.rest_positions)
+    blend = np.einsum("vk,vkab->vab", weights, turn[joints])
+    move = np.einsum("vk,vka->va", weights, shift[joints])
+    # Bones that are turned against each other by half a turn blend to nothing.
+    flat = np.linalg.det(blend) < 0.05
+    blend[flat] = turn[joints[flat, 0]]
+    move[flat] = shift[joints[flat, 0]]
+    rest = np.linalg.solve(blend, (vertices - move)[..., None])[..., 0]
+    rest_normals = np.linalg.solve(blend, normals[..., None])[..., 0]
+    return rest, rest_normals / np.linalg.norm(rest_normals, axis=1, keepdims=True)
