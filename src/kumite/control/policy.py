@@ -1,0 +1,186 @@
+"""Precomputed policies (Lee & Lee 2004, section 4): approach a target, strike it.
+
+    V(s, e) = max_a [ R(s, e, a) + γ^T(a) V(s', e') ]                                   (Eq. 4)
+
+s a state of the action table, e where the target is, seen from the avatar, T(a) the action's
+duration, e' the target seen from where the action leaves the avatar; V(s', e') is interpolated
+linearly between grid points. Solved by full sweeps to a stated residual (the paper samples).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from kumite.clip import LIMBS
+from kumite.control.grid import TargetGrid, approach_grid, strike_grid
+from kumite.errors import KumiteError
+from kumite.graph import Library
+from kumite.kernels import policy as kernels
+from kumite.rotation import planar_apply, planar_compose, planar_inverse
+
+DISCOUNT_PER_SECOND = 0.97**15  # the paper's 0.97 a frame at 15 frames a second
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """What the stretches do, seen from where they begin (the facing frame of first - 1)."""
+
+    centre: np.ndarray  # [L's frames, 2] m, ground track of the centroid of the hitting points
+    centre_start: np.ndarray  # [L + 1]
+    tip: np.ndarray  # [effective frames, 3] m
+    tip_weight: np.ndarray  # [effective frames] 0..1, speed over the fastest blow's
+    tip_when: np.ndarray  # [effective frames] frames since the action began, from 1
+    tip_start: np.ndarray  # [L + 1]
+
+
+def stretch_tracks(library: Library, limbs: tuple[str, ...] = LIMBS) -> Tracks:
+    """Tracks of every stretch; ``limbs`` are those whose hits count."""
+    table, strikes, facing = library.table, library.strikes, library.clips.facing
+    use = [LIMBS.index(limb) for limb in limbs]
+    effective = strikes.effective[:, use]
+    points = strikes.tip[:, use][effective]
+    ahead = points.mean(axis=0) if len(points) else np.array([0.0, 0.0, 0.8])
+    fastest = strikes.speed[:, use][effective].max() if len(points) else 1.0
+
+    length = table.duration
+    start = np.concatenate([[0], np.cumsum(length)])
+    owner = np.repeat(np.arange(len(length)), length)
+    since = np.arange(start[-1]) - start[owner]
+    frame = table.first[owner] + since
+    relative = planar_compose(planar_inverse(facing[table.first - 1])[owner], facing[frame])
+    centre = planar_apply(relative, ahead)[:, [0, 2]]
+
+    row, limb = np.nonzero(effective[frame])
+    tip = planar_apply(relative[row], strikes.tip[:, use][frame[row], limb])
+    return Tracks(
+        np.ascontiguousarray(centre),
+        start.astype(np.int64),
+        np.ascontiguousarray(tip),
+        strikes.speed[:, use][frame[row], limb] / fastest,
+        (since[row] + 1).astype(np.int64),
+        np.searchsorted(owner[row], np.arange(len(length) + 1)).astype(np.int64),
+    )
+
+
+@dataclass(frozen=True)
+class Behaviour:
+    """What is rewarded, and where it is looked up."""
+
+    name: str  # approach or strike
+    grid: TargetGrid
+    discount_per_second: float = DISCOUNT_PER_SECOND
+    sigma: float = 0.10  # m, how sharply approaching is rewarded (Eq. 5)
+    tolerance: float = 0.15  # m, how near a blow must pass to count (Eq. 6)
+    limbs: tuple[str, ...] = LIMBS
+
+    def __post_init__(self) -> None:
+        if self.name not in ("approach", "strike"):
+            raise KumiteError(f"unknown behaviour {self.name!r}; expected approach or strike")
+        if not 0 < self.discount_per_second < 1:
+            raise KumiteError("discount_per_second: expected more than 0 and less than 1")
+        if not (self.sigma > 0 and self.tolerance > 0):
+            raise KumiteError("sigma and tolerance: expected more than 0 m")
+
+
+def approach(**changes) -> Behaviour:
+    """Bring the place where blows land over the target (A6, A7)."""
+    return Behaviour("approach", approach_grid(), **changes)
+
+
+def strike(library: Library, **changes) -> Behaviour:
+    """Hit the target, fast (A6, A7). The grid is the bounding volume of the library's hits."""
+    return Behaviour("strike", strike_grid(library.strikes.points), **changes)
+
+
+@dataclass(frozen=True)
+class Policy:
+    """A solved behaviour: values of being in a state with the target at a grid point."""
+
+    behaviour: Behaviour
+    value: np.ndarray  # [N, M] float32
+    residual: float  # largest change of the last sweep, over the largest value
+    converged: bool
+    sweeps: int
+    backups: int  # Bellman backups done: actions × grid points × sweeps
+    seconds: float
+
+    @cached_property
+    def grid_arguments(self) -> tuple:
+        return self.behaviour.grid.kernel_arguments()
+
+
+def frame_discount(behaviour: Behaviour, fps: float) -> float:
+    """γ per frame at a rate: the same per second at any rate."""
+    return behaviour.discount_per_second ** (1.0 / fps)
+
+
+def stretch_rewards(behaviour: Behaviour, tracks: Tracks, fps: float) -> np.ndarray:
+    """R [L, M] float32 of every stretch for the target at every grid point."""
+    points = behaviour.grid.points
+    out = np.empty((len(tracks.tip_start) - 1, len(points)), dtype=np.float32)
+    discount = frame_discount(behaviour, fps)
+    if behaviour.name == "approach":
+        kernels.approach_rewards(
+            tracks.centre, tracks.centre_start, discount, behaviour.sigma, points, out
+        )
+    else:
+        kernels.strike_rewards(
+            tracks.tip,
+            tracks.tip_weight,
+            tracks.tip_when,
+            tracks.tip_start,
+            discount,
+            behaviour.tolerance,
+            points,
+            out,
+        )
+    return out
+
+
+def solve(
+    library: Library,
+    behaviour: Behaviour,
+    *,
+    residual: float = 1e-4,
+    most_sweeps: int = 1000,
+    progress: Callable[[int, float], None] = lambda sweep, residual: None,
+) -> Policy:
+    """Value iteration by full sweeps until a sweep changes no value by more than ``residual`` times
+    the largest value. ``converged`` says whether it got there within ``most_sweeps``.
+    """
+    begin = time.perf_counter()
+    table = library.table
+    tracks = stretch_tracks(library, behaviour.limbs)
+    grid = behaviour.grid
+    points = grid.points
+    reward = stretch_rewards(behaviour, tracks, library.clips.fps)
+    count = 4 if grid.size[2] == 1 else 8
+    index = np.empty((len(table.first), len(points), count), dtype=np.int32)
+    weight = np.empty(index.shape, dtype=np.float32)
+    kernels.successor_corners(table.displacement, points, *grid.kernel_arguments(), index, weight)
+    factor = (frame_discount(behaviour, library.clips.fps) ** table.duration).astype(np.float32)
+    value = np.zeros((table.states, len(points)), dtype=np.float32)
+    q = np.empty(reward.shape, dtype=np.float32)
+    change = np.empty(table.states, dtype=np.float32)
+    left, sweep = np.inf, 0
+    while sweep < most_sweeps and left > residual:
+        kernels.back_up_stretches(reward, factor, table.target, index, weight, value, q)
+        kernels.best_actions(table.action_start, table.stretch, q, value, change)
+        sweep += 1
+        largest = float(value.max())
+        left = float(change.max()) / largest if largest > 0 else 0.0
+        progress(sweep, left)
+    return Policy(
+        behaviour,
+        value,
+        left,
+        left <= residual,
+        sweep,
+        table.actions * len(points) * sweep,
+        time.perf_counter() - begin,
+    )
