@@ -1,0 +1,417 @@
+"""Mocap files, a folder of them or a list, loaded as clips in our conventions.
+
+Whatever a file does not say is inferred from the body (:mod:`kumite.mocap.infer`), and every such
+thing is kept as a readable fact. What the caller gives beats ``kumite.toml`` beside the files,
+which beats what the file states, which beats inference.
+"""
+
+from __future__ import annotations
+
+import glob
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from kumite.clip import Clip, ClipSet, concatenate, resample
+from kumite.errors import KumiteError
+from kumite.mocap import infer
+from kumite.mocap.asfamc import AsfSkeleton, read_amc, read_asf
+from kumite.mocap.bvh import read_bvh
+from kumite.mocap.raw import UP_AXES, RawMotion, to_clip
+from kumite.mocap.roles import FoundRoles, find_roles
+from kumite.mocap.settings import SettingsTree
+
+SUFFIXES = (".bvh", ".amc")
+How = Literal["given", "settings", "stated", "inferred", "assumed"]
+Source = str | Path | Sequence[str | Path]
+_MOST_PROBLEMS = 20  # shown of a folder that cannot be read
+
+
+@dataclass(frozen=True)
+class Fact:
+    """One thing about a clip and how it is known."""
+
+    what: str
+    value: str
+    how: How
+    why: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.what}: {self.value} ({self.how}{': ' if self.why else ''}{self.why})"
+
+
+@dataclass(frozen=True)
+class ClipInfo:
+    """Where a clip comes from and what was done to it on the way in."""
+
+    name: str
+    source: Path
+    skeleton_source: Path | None  # the ASF of an AMC
+    frames: int  # in the file
+    file_fps: float
+    metres_per_unit: float
+    up_axis: str
+    ground_height: float  # m; the height in the file that is y = 0 in the clip
+    roles: Mapping[str, str]  # role -> joint name
+    facts: tuple[Fact, ...]  # everything above that the file does not simply hold
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """Clips in metres, Y up, the ground at y = 0; and what is known about each."""
+
+    clips: tuple[Clip, ...]
+    info: tuple[ClipInfo, ...]  # one a clip
+
+    def clip_set(self, fps: float | None = None) -> ClipSet:
+        """All clips end to end at ``fps`` (their lowest rate by default).
+
+        Errors: two skeletons, named with the first joint that differs.
+        """
+        return concatenate(self.clips, fps)
+
+    def report(self) -> list[str]:
+        """Every fact once, with the clips that it holds for: what was inferred is never silent."""
+        holders: dict[str, list[str]] = {}
+        for info in self.info:
+            for fact in info.facts:
+                holders.setdefault(str(fact), []).append(info.name)
+        out = []
+        for fact, names in holders.items():
+            if len(names) == len(self.info):
+                who = "every clip" if len(names) > 1 else names[0]
+            else:
+                who = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if names[3:] else "")
+            out.append(f"{who}: {fact}")
+        return out
+
+
+@dataclass
+class _Take:
+    """One file on its way to a clip."""
+
+    path: Path
+    said: Mapping[str, Any]  # by kumite.toml
+    raw: RawMotion
+    roles: FoundRoles
+    given_fps: How | None
+    facts: list[Fact] = field(default_factory=list)
+
+
+def load(
+    source: Source,
+    *,
+    fps: float | None = None,
+    file_fps: float | None = None,
+    metres_per_unit: float | None = None,
+    up_axis: str | None = None,
+    ground: float | None = None,
+    roles: Mapping[str, str] | None = None,
+    names: Mapping[str, str] | None = None,
+) -> Loaded:
+    """Clips from a file, a folder (searched below too), a glob, or a list of these.
+
+    Args:
+        source: ``.bvh`` files, or ``.amc`` files with their ``.asf`` beside them.
+        fps: resample every clip to this rate.
+        file_fps: the files' own rate, where they do not state it or state a wrong one.
+        metres_per_unit: length of one unit of the files [m].
+        up_axis: ``'Y'`` or ``'Z'``.
+        ground: height of the floor in the files, Y up [m].
+        roles: joint names by role, for joints whose names and place say too little.
+        names: clip names by file name; otherwise a file's stem.
+
+    Errors: nothing to load, and everything that is wrong with any of the files, at once.
+    """
+    if up_axis is not None:
+        up_axis = up_axis.upper()
+        if up_axis not in UP_AXES:
+            raise KumiteError(f"up axis {up_axis!r}; expected one of {', '.join(UP_AXES)}")
+    for what, number in (("fps", fps), ("file_fps", file_fps), ("metres_per_unit", metres_per_unit)):
+        if number is not None and not (np.isfinite(number) and number > 0):
+            raise KumiteError(f"{what} {number}; expected a number more than 0")
+    if ground is not None and not np.isfinite(ground):
+        raise KumiteError(f"ground {ground}; expected a height in metres")
+    given = {
+        "fps": fps,
+        "file_fps": file_fps,
+        "metres_per_unit": metres_per_unit,
+        "up_axis": up_axis,
+        "ground_height": ground,
+    }
+    given = {k: v for k, v in given.items() if v is not None}
+    files = find_files(source)
+    settings = SettingsTree()
+    skeletons: dict[Path, AsfSkeleton] = {}
+    takes: list[_Take] = []
+    problems: list[str] = []
+    for path, top in files:
+        try:
+            takes.append(_read(path, settings.of(path, top), given, roles or {}, skeletons))
+        except KumiteError as error:
+            if str(error) not in problems:
+                problems.append(str(error))
+    if problems:
+        _raise(problems)
+    clip_names = _unique_names(takes, names or {})
+    clips: dict[Path, Clip] = {}
+    info: dict[Path, ClipInfo] = {}
+    for session in _sessions(takes):
+        for take, scale, up, floor in _inferred(session, given, problems):
+            name = clip_names[take.path]
+            clip = to_clip(
+                take.raw,
+                name,
+                metres_per_unit=scale,
+                up_axis=up,
+                ground_height=floor,
+                roles=take.roles.joints,
+            )
+            rate = given.get("fps", take.said.get("fps"))
+            clips[take.path] = resample(clip, rate) if rate else clip
+            info[take.path] = ClipInfo(
+                name,
+                take.path,
+                take.raw.skeleton_source,
+                len(take.raw),
+                take.raw.fps,
+                scale,
+                up,
+                floor,
+                {r: take.raw.skeleton.names[j] for r, j in take.roles.joints.items()},
+                tuple(take.facts),
+            )
+    if problems:
+        _raise(problems)
+    order = [t.path for t in takes]
+    return Loaded(tuple(clips[p] for p in order), tuple(info[p] for p in order))
+
+
+def _raise(problems: list[str]) -> None:
+    more = len(problems) - _MOST_PROBLEMS
+    rest = [f"and {more} more files with problems"] if more > 0 else []
+    raise KumiteError("\n".join([*problems[:_MOST_PROBLEMS], *rest]))
+
+
+# Finding -----------------------------------------------------------------------------------------
+
+
+def find_files(source: Source) -> list[tuple[Path, Path]]:
+    """Mocap files of a source, each with the folder up to which ``kumite.toml`` is looked for.
+
+    Errors: a path or glob that leads nowhere, a folder without mocap, a file of another kind.
+    """
+    if not isinstance(source, (str, Path)):
+        found: dict[Path, Path] = {}
+        for one in source:
+            for path, top in find_files(one):
+                found.setdefault(path, top)
+        if not found:
+            raise KumiteError("an empty list of files; expected .bvh or .amc files")
+        return list(found.items())
+    path = Path(source)
+    try:
+        is_folder, exists = path.is_dir(), path.exists()
+    except (OSError, ValueError):
+        raise KumiteError(f"{str(source)[:200]!r}: not a path") from None
+    if is_folder:
+        files = sorted(p for p in path.rglob("*") if _is_mocap(p))
+        if not files:
+            raise KumiteError(f"{path}: no mocap in this folder; expected .bvh or .amc files")
+        return [(p, path) for p in files]
+    if exists:
+        if path.suffix.lower() not in SUFFIXES:
+            raise KumiteError(f"{path}: not a mocap file; expected {' or '.join(SUFFIXES)}")
+        return [(path, path.parent)]
+    if glob.has_magic(str(path)):
+        matches = sorted(Path(p) for p in glob.glob(str(path), recursive=True))  # noqa: PTH207
+        files = [p for p in matches if _is_mocap(p)]
+        if not files:
+            raise KumiteError(f"{path}: matches no mocap; expected .bvh or .amc files")
+        return [(p, p.parent) for p in files]
+    raise KumiteError(f"{path}: no such file or folder")
+
+
+def _is_mocap(path: Path) -> bool:
+    return path.suffix.lower() in SUFFIXES and path.is_file()
+
+
+def find_asf(amc: Path) -> Path:
+    """The skeleton of an AMC: ``02.asf`` for ``02_01.amc``, or the only ASF beside it.
+
+    Errors: none, or several of which none has the AMC's name.
+    """
+    beside = sorted(p for p in amc.parent.iterdir() if p.suffix.lower() == ".asf" and p.is_file())
+    stem = amc.stem.lower()
+    mine = [
+        p
+        for p in beside
+        if stem == p.stem.lower()
+        or (stem.startswith(p.stem.lower()) and not stem[len(p.stem)].isalnum())
+    ]
+    if mine:
+        return max(mine, key=lambda p: len(p.stem))
+    if len(beside) == 1:
+        return beside[0]
+    there = ", ".join(p.name for p in beside) or "none there"
+    raise KumiteError(
+        f"{amc}: AMC without its ASF; expected {amc.stem.split('_')[0]}.asf, or only one ASF, "
+        f"beside it ({there})"
+    )
+
+
+# Reading -----------------------------------------------------------------------------------------
+
+
+def _read(
+    path: Path,
+    said: Mapping[str, Any],
+    given: Mapping[str, Any],
+    roles: Mapping[str, str],
+    skeletons: dict[Path, AsfSkeleton],
+) -> _Take:
+    if path.suffix.lower() == ".amc":
+        asf = find_asf(path)
+        if asf not in skeletons:
+            skeletons[asf] = read_asf(asf)
+        raw = read_amc(path, skeletons[asf])
+    else:
+        raw = read_bvh(path)
+    how: How | None = "given" if "file_fps" in given else "settings" if "file_fps" in said else None
+    fps = given.get("file_fps", said.get("file_fps"))
+    if fps is not None:
+        raw = replace(raw, fps=float(fps))
+    try:
+        found = find_roles(raw.skeleton, {**said.get("roles", {}), **roles})
+    except KumiteError as error:
+        raise KumiteError(f"{raw.skeleton_source or path}: {error}") from None
+    return _Take(path, said, raw, found, how)
+
+
+def _sessions(takes: Iterable[_Take]) -> list[list[_Take]]:
+    """Takes of one skeleton in one folder, which share scale, up axis and floor."""
+    groups: dict[tuple[Any, ...], list[_Take]] = {}
+    for take in takes:
+        skeleton = take.raw.skeleton
+        key = (
+            take.path.parent,
+            skeleton.names,
+            skeleton.parents.tobytes(),
+            np.round(skeleton.offsets[1:], 3).tobytes(),
+            tuple(take.roles.joints.items()),
+        )
+        groups.setdefault(key, []).append(take)
+    return list(groups.values())
+
+
+def _inferred(
+    session: list[_Take], given: Mapping[str, Any], problems: list[str]
+) -> list[tuple[_Take, float, str, float]]:
+    """Scale, up axis and floor of each take; facts are added to the takes."""
+    out = []
+    shared: dict[Any, Any] = {}
+
+    def settle(take: _Take, key: str, unit: str, guess: Any, among: tuple[Any, ...] = ()) -> Any:
+        for how, source in (("given", given), ("settings", take.said)):
+            if key in source:
+                value = float(source[key]) if key != "up_axis" else source[key]
+                take.facts.append(Fact(key, f"{_short(value)}{unit}", how))
+                return value
+        if (key, *among) not in shared:
+            shared[(key, *among)] = guess(*among)
+        inferred = shared[(key, *among)]
+        how = "stated" if inferred.stated else "inferred"
+        take.facts.append(Fact(key, f"{_short(inferred.value)}{unit}", how, inferred.why))
+        return inferred.value
+
+    first = session[0]
+    raws = [t.raw for t in session]
+    joints = first.roles.joints
+    for take in session:
+        take.facts.append(_rate_fact(take))
+        if take.raw.skeleton_source is not None:
+            take.facts.append(Fact("skeleton", take.raw.skeleton_source.name, "inferred", "its name"))
+        try:
+            scale = settle(
+                take, "metres_per_unit", "", lambda: infer.metres_per_unit(first.raw, joints)
+            )
+        except KumiteError as error:
+            problems.append(str(error))
+            return []
+        up = settle(take, "up_axis", "", lambda: infer.up_axis(raws, joints))
+        floor = settle(
+            take,
+            "ground_height",
+            " m",
+            lambda scale, up: infer.ground_height(raws, joints, scale, up),
+            (scale, up),
+        )
+        take.facts += _role_facts(take)
+        take.facts += [Fact("repair", note, "inferred") for note in take.raw.notes]
+        out.append((take, scale, up, floor))
+    return out
+
+
+def _short(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:.6g}"
+
+
+def _rate_fact(take: _Take) -> Fact:
+    how: How = take.given_fps or ("stated" if take.raw.fps_stated else "assumed")
+    why = "" if how != "assumed" else "the file does not say; usual of CMU's AMC files"
+    return Fact("file_fps", f"{take.raw.fps:.6g}", how, why)
+
+
+def _role_facts(take: _Take) -> list[Fact]:
+    names = take.raw.skeleton.names
+    sources: tuple[tuple[str, How, str], ...] = (
+        ("given", "given", ""),
+        ("name", "inferred", "joint names"),
+        ("tree", "inferred", "the tree's shape"),
+    )
+    facts = []
+    for source, how, why in sources:
+        pairs = [f"{r}={names[j]}" for r, j in take.roles.joints.items() if take.roles.how[r] == source]
+        if pairs:
+            facts.append(Fact("roles", ", ".join(pairs), how, why))
+    return facts
+
+
+# Names -------------------------------------------------------------------------------------------
+
+
+def _unique_names(takes: Sequence[_Take], given: Mapping[str, str]) -> dict[Path, str]:
+    """Clip names: given, from the settings, or the stem; told apart by their folders when equal.
+
+    Errors: a given name for a file that is not there; a given name used twice.
+    """
+    keys = {k: t.path for t in takes for k in (t.path.stem, t.path.name, t.path.as_posix())}
+    for key in given:
+        if key not in keys:
+            raise KumiteError(f"a name for {key!r}, which is not among the files")
+    chosen: dict[Path, str] = {}
+    for take in takes:
+        for key in (take.path.as_posix(), take.path.name, take.path.stem):
+            if key in given:
+                chosen[take.path] = given[key]
+                break
+        else:
+            if "name" in take.said:
+                chosen[take.path] = take.said["name"]
+    twice = sorted({n for n in chosen.values() if list(chosen.values()).count(n) > 1})
+    if twice:
+        raise KumiteError(f"clip names given twice: {', '.join(twice)}")
+    rest = [t.path for t in takes if t.path not in chosen]
+    deepest = max((len(p.parts) for p in rest), default=1)
+    names = {p: p.stem for p in rest}
+    for depth in range(2, deepest + 2):
+        all_names = [*chosen.values(), *names.values()]
+        same = {n for n in all_names if all_names.count(n) > 1}
+        for path in [p for p in rest if names[p] in same]:
+            parts = [*path.parts[-depth:-1], path.stem]
+            last = depth > len(path.parts)
+            names[path] = path.as_posix() if last else "-".join(p.strip("/") for p in parts)
+    return chosen | names

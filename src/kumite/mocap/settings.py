@@ -1,0 +1,160 @@
+"""``kumite.toml`` beside mocap files: what a user knows better than any inference.
+
+```toml
+metres_per_unit = 0.01        # for every file in this folder and below
+up_axis = "Y"
+ground_height = 0.02          # m
+file_fps = 120                # where files do not state their rate, or state a wrong one
+fps = 30                      # resample everything to this rate
+
+[roles]
+head = "Skull"
+
+[files."walk_01.bvh"]         # for one file; a name, or a path below this folder
+metres_per_unit = 0.0254
+name = "walk"
+```
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+
+from kumite.clip import ROLES
+from kumite.errors import KumiteError, at
+
+FILE_NAME = "kumite.toml"
+_Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+_Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class FileSettings(BaseModel):
+    """What may be said of one file."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    metres_per_unit: _Positive | None = None
+    up_axis: Literal["Y", "Z"] | None = None
+    ground_height: _Finite | None = None  # m
+    file_fps: _Positive | None = None  # frames a second of the file
+    roles: dict[str, str] | None = None  # role -> joint name
+    name: str | None = Field(default=None, min_length=1)
+
+    @field_validator("up_axis", mode="before")
+    @classmethod
+    def _upper(cls, value: Any) -> Any:
+        return value.upper() if isinstance(value, str) else value
+
+    @field_validator("roles")
+    @classmethod
+    def _known(cls, value: dict[str, str] | None) -> dict[str, str] | None:
+        odd = [r for r in value or {} if r not in ROLES]
+        if odd:
+            raise ValueError(f"unknown role {odd[0]!r}; expected one of {', '.join(ROLES)}")
+        return value
+
+
+class FolderSettings(FileSettings):
+    """What may be said of a folder and all below it."""
+
+    name: None = None
+    fps: _Positive | None = None  # resample to this rate
+    files: dict[str, FileSettings] = Field(default_factory=dict)
+
+
+def read_settings(folder: Path) -> FolderSettings | None:
+    """The settings beside the files of a folder; None if there are none.
+
+    Errors: not TOML; unknown keys and bad values, all at once, with the valid choices; a table for
+    a file that is not there.
+    """
+    path = folder / FILE_NAME
+    try:
+        source = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return None
+    except (OSError, UnicodeDecodeError) as error:
+        raise KumiteError(f"{path}: cannot be read ({error})") from None
+    try:
+        data = tomllib.loads(source)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        line = re.search(r"at line (\d+)", str(error))
+        raise at(path, int(line[1]) if line else None, f"not TOML: {error}") from None
+    try:
+        settings = FolderSettings.model_validate(data)
+    except ValidationError as error:
+        raise KumiteError("\n".join(_problems(path, source, error))) from None
+    for name in settings.files:
+        if not (folder / name).is_file():
+            raise at(
+                path, _line_of(source, name), f"files.{name!r}: no such file; expected a path below {folder}"
+            )
+    return settings
+
+
+def _problems(path: Path, source: str, error: ValidationError) -> list[str]:
+    out = []
+    for problem in error.errors():
+        where = [str(k) for k in problem["loc"]]
+        inside_file = where[0] == "files" and len(where) > 2
+        model = FileSettings if inside_file else FolderSettings
+        key = ".".join(repr(k) if "." in k else k for k in where)
+        if problem["type"] == "extra_forbidden":
+            valid = sorted(k for k in model.model_fields if inside_file or k != "name")
+            what = f"unknown key {key!r}; expected one of {', '.join(valid)}"
+        else:
+            message = problem["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+            expected = message if "expected" in message else f"expected {message}"
+            what = f"{key}: {problem['input']!r}; {expected}"
+        out.append(f"{at(path, _line_of(source, where[-1]), what)}")
+    return out
+
+
+def _line_of(source: str, key: str) -> int | None:
+    """The line on which a key stands, as far as its text tells."""
+    for n, line in enumerate(source.split("\n"), 1):
+        if re.search(rf"(^|[\s.\[\"'{{,]){re.escape(key)}([\s\"'=\]]|$)", line.partition("#")[0]):
+            return n
+    return None
+
+
+class SettingsTree:
+    """The settings of a source folder and the folders below it, each read once.
+
+    The nearest folder's word wins, and a file's own table beats its folder.
+    """
+
+    def __init__(self) -> None:
+        self._read: dict[Path, FolderSettings | None] = {}
+
+    def folder(self, folder: Path) -> FolderSettings | None:
+        if folder not in self._read:
+            self._read[folder] = read_settings(folder)
+        return self._read[folder]
+
+    def of(self, path: Path, top: Path) -> Mapping[str, Any]:
+        """What is said of one file below ``top``; keys that nobody mentions are absent."""
+        folders = [path.parent]
+        while folders[-1] != top and top in folders[-1].parents:
+            folders.append(folders[-1].parent)
+        out: dict[str, Any] = {}
+        for folder in reversed(folders):
+            settings = self.folder(folder)
+            if settings is None:
+                continue
+            own = settings.files.get(path.relative_to(folder).as_posix())
+            for model in (settings, own):
+                if model is None:
+                    continue
+                said = model.model_dump(exclude_none=True, exclude={"files"})
+                roles = {**out.get("roles", {}), **said.pop("roles", {})}
+                out |= said
+                if roles:
+                    out["roles"] = roles
+        return out
