@@ -62,7 +62,10 @@ def find_strikes(
         side, part = limb.split("_")
         point = tip_positions(skeleton, limb, position, world)
         v = velocity(point, clips)
-        axis = position[:, skeleton.joint(limb)] - position[:, skeleton.joint(f"{side}_{_SEGMENT[part]}")]
+        axis = (
+            position[:, skeleton.joint(limb)]
+            - position[:, skeleton.joint(f"{side}_{_SEGMENT[part]}")]
+        )
         axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-9)
         speed[:, k] = np.sum(v * axis, axis=1)
         tip[:, k] = planar_apply(to_facing, point)

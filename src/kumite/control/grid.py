@@ -73,7 +73,11 @@ class TargetGrid:
 def approach_grid(radius: float = 2.0, distances: int = 5, angles: int = 13) -> TargetGrid:
     """The paper's grid for approaching: flat, all round, 2 m, 5 distances × 13 angles."""
     return TargetGrid(
-        (-np.pi, 0.0, 0.0), (np.pi, radius, 0.0), (angles, distances, 1), wraps=True, inside_only=False
+        (-np.pi, 0.0, 0.0),
+        (np.pi, radius, 0.0),
+        (angles, distances, 1),
+        wraps=True,
+        inside_only=False,
     )
 
 

@@ -31,7 +31,9 @@ class ActionTable:
     first: np.ndarray  # [L] int32, first frame played
     last: np.ndarray  # [L] int32, last frame played: the next state's frame
     target: np.ndarray  # [L] int32, the state it ends in
-    displacement: np.ndarray  # [L, 3] (x, z, yaw) from the facing frame of first - 1 to that of last
+    displacement: (
+        np.ndarray
+    )  # [L, 3] (x, z, yaw) from the facing frame of first - 1 to that of last
 
     @property
     def duration(self) -> np.ndarray:

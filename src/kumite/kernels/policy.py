@@ -68,9 +68,7 @@ def corners(x, y, z, low, step, size, wraps, inside_only, index, weight):
         iv = v1 if dv else v0
         ih = h1 if dh else h0
         index[k] = (iu * size[1] + iv) * heights + ih
-        weight[k] = (
-            (fu if du else 1.0 - fu) * (fv if dv else 1.0 - fv) * (fh if dh else 1.0 - fh)
-        )
+        weight[k] = (fu if du else 1.0 - fu) * (fv if dv else 1.0 - fv) * (fh if dh else 1.0 - fh)
         k += 1
     return count
 
@@ -86,9 +84,7 @@ def interpolate(value, x, y, z, low, step, size, wraps, inside_only, index, weig
 
 
 @parallel_kernel
-def successor_corners(
-    displacement, points, low, step, size, wraps, inside_only, index, weight
-):
+def successor_corners(displacement, points, low, step, size, wraps, inside_only, index, weight):
     """Where each grid point lies on the grid after each stretch.
 
     points [M, 3]; index [L, M, W] int32 and weight [L, M, W] float32 are filled.
@@ -185,3 +181,107 @@ def best_actions(action_start, stretch, q, value, change):
         for m in range(row.shape[0]):
             largest = max(largest, abs(row[m] - old[m]))
         change[s] = largest
+
+
+@kernel
+def look_ahead(
+    state,
+    target,
+    other,
+    action_start,
+    stretch,
+    successor,
+    displacement,
+    duration,
+    discount_approach,
+    sigma,
+    track,
+    track_start,
+    approach_value,
+    approach_grid,
+    weight_approach,
+    discount_strike,
+    tolerance,
+    tip,
+    tip_weight,
+    tip_when,
+    tip_start,
+    strike_value,
+    strike_grid,
+    weight_strike,
+    root,
+    worth,
+    gap,
+):
+    """One step of Eq. 4 at run time, exact in the continuous target, for every action of a state.
+
+    target [H, 3]: where the target is expected at frames 1.. after the decision, seen from the
+    avatar's facing frame; the last row holds from then on. other [H, 2]: the same for the body that
+    must not be run into. track, tip, root: what the stretches do (root [., 2] shares track_start).
+    A grid is (low, step, size, wraps, inside_only). Fills worth [n] with the weighted values and
+    gap [n] with the smallest distance kept to the other body.
+    """
+    index = np.zeros(8, dtype=np.int64)
+    weight = np.zeros(8)
+    horizon = target.shape[0] - 1
+    low_a, step_a, size_a, wraps_a, inside_a = approach_grid
+    low_s, step_s, size_s, wraps_s, inside_s = strike_grid
+    for n, a in enumerate(range(action_start[state], action_start[state + 1])):
+        k = stretch[a]
+        first, last = track_start[k], track_start[k + 1]
+        end = min(duration[k], horizon + 1) - 1
+        x, z = carry(displacement[k], target[end, 0], target[end, 2])
+        y = target[end, 1]
+        worth[n] = 0.0
+        if weight_approach != 0.0:
+            best, factor = 0.0, 1.0
+            for t in range(last - first):
+                factor *= discount_approach
+                if factor <= best:
+                    break
+                h = min(t, horizon)
+                d = np.hypot(track[first + t, 0] - target[h, 0], track[first + t, 1] - target[h, 2])
+                best = max(best, factor * np.exp(-d / sigma))
+            later = interpolate(
+                approach_value[successor[k]],
+                x,
+                y,
+                z,
+                low_a,
+                step_a,
+                size_a,
+                wraps_a,
+                inside_a,
+                index,
+                weight,
+            )
+            worth[n] += weight_approach * (best + discount_approach ** duration[k] * later)
+        if weight_strike != 0.0:
+            best = 0.0
+            for p in range(tip_start[k], tip_start[k + 1]):
+                h = min(tip_when[p] - 1, horizon)
+                d2 = 0.0
+                for c in range(3):
+                    d2 += (tip[p, c] - target[h, c]) ** 2
+                if d2 <= tolerance * tolerance:
+                    best = max(best, discount_strike ** tip_when[p] * tip_weight[p])
+            later = interpolate(
+                strike_value[successor[k]],
+                x,
+                y,
+                z,
+                low_s,
+                step_s,
+                size_s,
+                wraps_s,
+                inside_s,
+                index,
+                weight,
+            )
+            worth[n] += weight_strike * (best + discount_strike ** duration[k] * later)
+        nearest = np.inf
+        for t in range(last - first):
+            h = min(t, horizon)
+            d = np.hypot(root[first + t, 0] - other[h, 0], root[first + t, 1] - other[h, 1])
+            nearest = min(nearest, d)
+        gap[n] = nearest

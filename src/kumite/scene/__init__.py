@@ -1,1 +1,26 @@
-"""."""
+"""Scenes: characters, objects and events; live, recorded and measured."""
+
+from kumite.scene.live import LiveScene
+from kumite.scene.metrics import CharacterMetrics, Metrics, measure
+from kumite.scene.recording import Event, Recording, load_recording, save_recording
+from kumite.scene.run import record
+from kumite.scene.settings import SceneSettings, builtin_scenes, load_scene
+from kumite.scene.stage import Playback, SceneObject, Stage
+
+__all__ = [
+    "CharacterMetrics",
+    "Event",
+    "LiveScene",
+    "Metrics",
+    "Playback",
+    "Recording",
+    "SceneObject",
+    "SceneSettings",
+    "Stage",
+    "builtin_scenes",
+    "load_recording",
+    "load_scene",
+    "measure",
+    "record",
+    "save_recording",
+]

@@ -1,0 +1,122 @@
+"""A fighter: several behaviours at once by a weighted sum, random among the best few (A9)."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from kumite.control.policy import Policy, Tracks, frame_discount
+from kumite.errors import KumiteError
+from kumite.graph import Library
+from kumite.kernels import policy as kernels
+
+
+@dataclass
+class Temper:
+    """How a fighter chooses. All of it may be changed while the scene runs."""
+
+    approach: float = 1.0  # weight of bringing blows' reach over the target
+    strike: float = 2.0  # weight of hitting it
+    few: int = 3  # how many of the best actions are drawn from
+    slack: float = 0.1  # an action is among the best if worth at least (1 - slack) × the best one's
+    boredom: float = 0.5  # how much an action's worth is cut down while it was used recently
+    memory: int = 6  # how many actions back "recently" goes
+    personal_space: float = 0.45  # m between the bodies that an action must leave
+
+    def __post_init__(self) -> None:
+        if self.approach < 0 or self.strike < 0 or self.approach + self.strike == 0:
+            raise KumiteError("weights: approach and strike must not be below 0, nor both 0")
+        if self.few < 1 or self.memory < 0:
+            raise KumiteError("few: expected at least 1; memory: at least 0")
+
+
+@dataclass(frozen=True)
+class Choice:
+    stretch: int
+    worth: float
+    considered: int  # actions the state offers
+    apart: int  # of these, the ones that keep the personal space
+
+
+@dataclass(frozen=True)
+class Skill:
+    """What all fighters of one library share: policies and the tracks of its actions."""
+
+    library: Library
+    approach: Policy
+    strike: Policy
+    tracks: Tracks
+
+    @property
+    def horizon(self) -> int:
+        """Frames of the longest action: how far ahead a target's place can matter."""
+        return int(self.library.table.duration.max())
+
+
+@dataclass
+class Fighter:
+    """One character's mind: it sees where its target will be and picks the next action."""
+
+    skill: Skill
+    temper: Temper
+    rng: np.random.Generator
+    _recent: deque[int] = field(default_factory=deque)
+
+    def choose(self, state: int, target: np.ndarray, other: np.ndarray) -> Choice:
+        """Pick an action of ``state``.
+
+        target [H, 3]: the target's expected places at frames 1.. from now, other [H, 2] those of
+        the body to keep apart from; both in the avatar's facing frame, the last row from then on.
+        """
+        skill, temper = self.skill, self.temper
+        table, tracks = skill.library.table, skill.tracks
+        actions = table.actions_of(state)
+        worth = np.empty(actions.stop - actions.start)
+        gap = np.empty(len(worth))
+        fps = skill.library.clips.fps
+        near, hit = skill.approach, skill.strike
+        kernels.look_ahead(
+            state,
+            target,
+            other,
+            table.action_start,
+            table.stretch,
+            table.target,
+            table.displacement,
+            table.duration,
+            frame_discount(near.behaviour, fps),
+            near.behaviour.sigma,
+            tracks.centre,
+            tracks.centre_start,
+            near.value,
+            near.grid_arguments,
+            temper.approach,
+            frame_discount(hit.behaviour, fps),
+            hit.behaviour.tolerance,
+            tracks.tip,
+            tracks.tip_weight,
+            tracks.tip_when,
+            tracks.tip_start,
+            hit.value,
+            hit.grid_arguments,
+            temper.strike,
+            tracks.root,
+            worth,
+            gap,
+        )
+        stretch = table.stretch[actions]
+        apart = gap >= temper.personal_space
+        # Where every action would come too near, those that stay farthest off.
+        allowed = apart if apart.any() else gap >= gap.max() - 0.02
+        recent = np.isin(stretch, np.fromiter(self._recent, np.int64, len(self._recent)))
+        value = np.where(recent, (1.0 - temper.boredom) * worth, worth)
+        value[~allowed] = -np.inf
+        order = np.argsort(-value, kind="stable")[: temper.few]
+        best = order[value[order] >= (1.0 - temper.slack) * value[order[0]]]
+        pick = int(best[self.rng.integers(len(best))])
+        self._recent.append(int(stretch[pick]))
+        while len(self._recent) > temper.memory:
+            self._recent.popleft()
+        return Choice(int(stretch[pick]), float(worth[pick]), len(worth), int(apart.sum()))

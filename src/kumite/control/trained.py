@@ -1,0 +1,71 @@
+"""Trained policies on disk: solved on first use, found again by content."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+
+from kumite import files
+from kumite.control.policy import Behaviour, Policy, solve
+from kumite.errors import KumiteError
+from kumite.graph import Library
+
+KIND = "policy"
+VERSION = 1
+RESIDUAL = 1e-4
+
+
+def cache_folder(library_path: Path | str | None) -> Path:
+    """Beside the library file; in the user's cache for the built-in performer."""
+    if library_path is not None:
+        return Path(f"{library_path}.cache")
+    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    return Path(base) / "kumite"
+
+
+def trained(
+    library: Library,
+    behaviour: Behaviour,
+    folder: Path | str | None,
+    *,
+    residual: float = RESIDUAL,
+    progress: Callable[[str, int, float], None] = lambda name, sweep, residual: None,
+) -> Policy:
+    """The policy of a behaviour: read from ``folder``, else solved and kept there.
+
+    A folder of None, or one that cannot be written, only means that it is solved again next time.
+    """
+    settings = {"library": library.digest, "residual": residual, **asdict(behaviour)}
+    key = hashlib.sha256(f"{VERSION}{json.dumps(settings, sort_keys=True)}".encode()).hexdigest()
+    path = None if folder is None else Path(folder) / f"{behaviour.name}-{key[:16]}.policy"
+    if path is not None and path.exists():
+        try:
+            header, arrays = files.load(path, KIND, VERSION)
+            value = arrays["value"]
+            if value.shape == (library.table.states, len(behaviour.grid)):
+                return Policy(behaviour, value, **header)
+        except (KumiteError, KeyError, TypeError):
+            pass  # damaged or of another version: solve it again and write it anew
+    policy = solve(
+        library,
+        behaviour,
+        residual=residual,
+        progress=lambda sweep, left: progress(behaviour.name, sweep, left),
+    )
+    if path is not None:
+        header = {
+            "residual": policy.residual,
+            "converged": policy.converged,
+            "sweeps": policy.sweeps,
+            "backups": policy.backups,
+            "seconds": policy.seconds,
+        }
+        try:
+            files.save(path, KIND, VERSION, header, {"value": policy.value})
+        except KumiteError:
+            pass
+    return policy

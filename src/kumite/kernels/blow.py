@@ -1,0 +1,122 @@
+"""Do fists meet bodies? Swept tests between two frames, so that no fist skips through.
+
+Shapes: K characters, B body parts (tapered capsules), 4 limbs.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kumite.kernels.jit import kernel
+from kumite.kernels.pose import add_rotated
+
+NO_HIT = -1
+NO_BLOW = -1
+NOBODY = -1
+
+
+@kernel
+def capsule_gap(p, a, b, radius_a, radius_b):
+    """Distance from a point to a tapered capsule's skin (negative inside), radius interpolated."""
+    ab2 = ap = 0.0
+    for c in range(3):
+        ab2 += (b[c] - a[c]) ** 2
+        ap += (b[c] - a[c]) * (p[c] - a[c])
+    t = min(max(ap / ab2, 0.0), 1.0) if ab2 > 1e-12 else 0.0
+    d2 = 0.0
+    for c in range(3):
+        d2 += (p[c] - a[c] - t * (b[c] - a[c])) ** 2
+    return np.sqrt(d2) - (radius_a + t * (radius_b - radius_a))
+
+
+@kernel
+def swept_contact(p0, p1, a0, a1, b0, b1, radius_a, radius_b, radius):
+    """First time 0..1 at which a moving sphere touches a moving tapered capsule, or -1.
+
+    Both move in straight lines between two frames; steps are a quarter of the thinnest radius, so
+    that nothing can pass through between two of them.
+    """
+    travel = 0.0
+    for c in range(3):
+        step = max(abs((p1[c] - p0[c]) - (a1[c] - a0[c])), abs((p1[c] - p0[c]) - (b1[c] - b0[c])))
+        travel += step * step
+    thin = 0.25 * (min(radius_a, radius_b) + radius)
+    steps = int(np.ceil(np.sqrt(travel) / thin)) + 1
+    p, a, b = np.empty(3), np.empty(3), np.empty(3)
+    for k in range(steps + 1):
+        t = k / steps
+        for c in range(3):
+            p[c] = p0[c] + t * (p1[c] - p0[c])
+            a[c] = a0[c] + t * (a1[c] - a0[c])
+            b[c] = b0[c] + t * (b1[c] - b0[c])
+        if capsule_gap(p, a, b, radius_a, radius_b) <= radius:
+            return t
+    return -1.0
+
+
+@kernel
+def part_ends(position, world_wxyz, joint, start, end, a, b):
+    """Ends of every body part of every character in the scene: a, b [K, B, 3]."""
+    for k in range(position.shape[0]):
+        for p in range(joint.shape[0]):
+            j = joint[p]
+            add_rotated(world_wxyz[k, j], start[p], position[k, j], a[k, p])
+            add_rotated(world_wxyz[k, j], end[p], position[k, j], b[k, p])
+
+
+@kernel
+def limb_tips(position, world_wxyz, joint, offset, tip):
+    """Tips of the four limbs of every character: tip [K, 4, 3]."""
+    for k in range(position.shape[0]):
+        for s in range(joint.shape[0]):
+            add_rotated(world_wxyz[k, joint[s]], offset[s], position[k, joint[s]], tip[k, s])
+
+
+@kernel
+def find_hits(
+    opponent,
+    blow,
+    landed,
+    tip_before,
+    tip,
+    a_before,
+    a,
+    b_before,
+    b,
+    radius_a,
+    radius_b,
+    target_part,
+    limb_radius,
+    hit_part,
+    hit_time,
+):
+    """Which blows touch the opponent's target parts during this frame.
+
+    opponent [K] or NOBODY; blow [K, 4] the blow each limb is throwing, or NO_BLOW; landed [K, 4]
+    the last blow of the limb that landed (a blow lands once); target_part [B] bool. Fills hit_part
+    [K, 4] (or NO_HIT) and hit_time [K, 4] (0..1 within the frame).
+    """
+    for k in range(opponent.shape[0]):
+        v = opponent[k]
+        for s in range(4):
+            hit_part[k, s] = NO_HIT
+            hit_time[k, s] = 2.0
+            if v == NOBODY or blow[k, s] == NO_BLOW or blow[k, s] == landed[k, s]:
+                continue
+            for p in range(target_part.shape[0]):
+                if not target_part[p]:
+                    continue
+                t = swept_contact(
+                    tip_before[k, s],
+                    tip[k, s],
+                    a_before[v, p],
+                    a[v, p],
+                    b_before[v, p],
+                    b[v, p],
+                    radius_a[p],
+                    radius_b[p],
+                    limb_radius[s],
+                )
+                if t >= 0.0 and t < hit_time[k, s]:
+                    hit_time[k, s] = t
+                    hit_part[k, s] = p

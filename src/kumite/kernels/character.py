@@ -1,0 +1,454 @@
+"""Characters played from a library, all K at once: joins, inertialisation, foot lock, pose.
+
+A character shows library frame f under an anchor, the planar transform from the library's world to
+the scene's. At a join the anchor changes so that the facing frame stays, and what is left of the
+difference (joint rotations, height, velocities) becomes an offset that a critically damped spring
+takes to zero: pose and velocity are continuous. A planted foot does not take part in that: its
+offset stays while it bears weight, and fades while it is in the air.
+
+Shapes: K characters, J joints, F frames. Rotation offsets are rotation vectors in joint axes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import prange
+
+from kumite.kernels.jit import kernel, parallel_kernel
+from kumite.kernels.pose import add_rotated, forward_kinematics_frame, quaternion_product
+
+TINY = 1e-12
+MANY = 16  # characters from which several threads pay
+
+
+@kernel
+def exponential(v, out):
+    """Quaternion of a rotation vector."""
+    angle = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    s = np.sin(0.5 * angle) / angle if angle > 1e-9 else 0.5
+    out[0] = np.cos(0.5 * angle)
+    for c in range(3):
+        out[1 + c] = s * v[c]
+
+
+@kernel
+def logarithm(q, out):
+    """Rotation vector of the shortest arc of a quaternion."""
+    sign = -1.0 if q[0] < 0.0 else 1.0
+    s = np.sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    scale = sign * (2.0 * np.arctan2(s, sign * q[0]) / s if s > 1e-9 else 2.0)
+    for c in range(3):
+        out[c] = scale * q[1 + c]
+
+
+@kernel
+def conjugate(q, out):
+    out[0] = q[0]
+    for c in range(1, 4):
+        out[c] = -q[c]
+
+
+@kernel
+def difference(a, b, out):
+    """Rotation vector of a⁻¹ b."""
+    inverse = np.empty(4)
+    product = np.empty(4)
+    conjugate(a, inverse)
+    quaternion_product(inverse, b, product)
+    logarithm(product, out)
+
+
+@kernel
+def planar_point(t, x, z):
+    """A ground point carried by a planar transform (x, z, yaw)."""
+    c, s = np.cos(t[2]), np.sin(t[2])
+    return c * x + s * z + t[0], -s * x + c * z + t[1]
+
+
+@kernel
+def wrap(angle):
+    return angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
+
+
+@kernel
+def align(anchor, facing_from, facing_to, out):
+    """The anchor under which ``facing_to`` lies where ``facing_from`` lay under ``anchor``."""
+    x, z = planar_point(anchor, facing_from[0], facing_from[1])
+    yaw = anchor[2] + facing_from[2] - facing_to[2]
+    c, s = np.cos(yaw), np.sin(yaw)
+    out[0] = x - (c * facing_to[0] + s * facing_to[1])
+    out[1] = z - (-s * facing_to[0] + c * facing_to[1])
+    out[2] = wrap(yaw)
+
+
+@kernel
+def spring(position, velocity, half_life, dt):
+    """One step of a critically damped spring to zero, in place: exact for any dt."""
+    y = 2.0 * 0.6931471805599453 / half_life
+    e = np.exp(-y * dt)
+    for c in range(position.shape[0]):
+        j = velocity[c] + position[c] * y
+        position[c] = e * (position[c] + j * dt)
+        velocity[c] = e * (velocity[c] - j * y * dt)
+
+
+@kernel
+def anchored_root(anchor, root_position, root_wxyz, position, wxyz):
+    """A library root pose in the scene."""
+    x, z = planar_point(anchor, root_position[0], root_position[2])
+    position[0] = x
+    position[1] = root_position[1]
+    position[2] = z
+    turn = np.zeros(4)
+    turn[0] = np.cos(0.5 * anchor[2])
+    turn[2] = np.sin(0.5 * anchor[2])
+    quaternion_product(turn, root_wxyz, wxyz)
+
+
+@kernel
+def join(
+    anchor,
+    frame_from,
+    frame_to,
+    fps,
+    library_root,
+    library_wxyz,
+    library_facing,
+    library_ankle,
+    clip_of_frame,
+    offset,
+    offset_velocity,
+    root_offset,
+    root_offset_velocity,
+    foot_offset,
+):
+    """Move one character from frame_from to frame_to = j - 1, which it resembles, in place.
+
+    What was shown stays shown: the differences go into the offsets.
+    """
+    before = anchor.copy()
+    align(before, library_facing[frame_from], library_facing[frame_to], anchor)
+    held, shown, turn, base = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
+    p_from, p_to = np.empty(3), np.empty(3)
+    v, w = np.zeros(3), np.zeros(3)
+    past_from = frame_from - 1
+    if past_from < 0 or clip_of_frame[past_from] != clip_of_frame[frame_from]:
+        past_from = frame_from
+    past_to = frame_to - 1
+    if past_to < 0 or clip_of_frame[past_to] != clip_of_frame[frame_to]:
+        past_to = frame_to
+    for j in range(library_wxyz.shape[1]):
+        exponential(offset[j], held)
+        if j == 0:
+            anchored_root(
+                before, library_root[frame_from], library_wxyz[frame_from, 0], p_from, turn
+            )
+            anchored_root(anchor, library_root[frame_to], library_wxyz[frame_to, 0], p_to, base)
+        else:
+            turn[:] = library_wxyz[frame_from, j]
+            base[:] = library_wxyz[frame_to, j]
+        quaternion_product(turn, held, shown)
+        difference(base, shown, offset[j])
+        difference(library_wxyz[past_from, j], library_wxyz[frame_from, j], v)
+        difference(library_wxyz[past_to, j], library_wxyz[frame_to, j], w)
+        for c in range(3):
+            offset_velocity[j, c] += (v[c] - w[c]) * fps
+    for c in range(3):
+        root_offset[c] += p_from[c] - p_to[c]
+        v[c] = library_root[frame_from, c] - library_root[past_from, c]
+        w[c] = library_root[frame_to, c] - library_root[past_to, c]
+    spin = np.zeros(3)
+    spin[2] = before[2]
+    vx, vz = planar_point(spin, v[0], v[2])
+    spin[2] = anchor[2]
+    wx, wz = planar_point(spin, w[0], w[2])
+    root_offset_velocity[0] += (vx - wx) * fps
+    root_offset_velocity[1] += (v[1] - w[1]) * fps
+    root_offset_velocity[2] += (vz - wz) * fps
+    for f in range(2):
+        x0, z0 = planar_point(
+            before, library_ankle[frame_from, f, 0], library_ankle[frame_from, f, 2]
+        )
+        x1, z1 = planar_point(anchor, library_ankle[frame_to, f, 0], library_ankle[frame_to, f, 2])
+        foot_offset[f, 0] += x0 - x1
+        foot_offset[f, 1] += library_ankle[frame_from, f, 1] - library_ankle[frame_to, f, 1]
+        foot_offset[f, 2] += z0 - z1
+
+
+@kernel
+def turn_joint(joint, parents, delta, wxyz, world_wxyz):
+    """Turn a joint by a rotation given in world axes; only its local rotation is changed."""
+    turned, inverse = np.empty(4), np.empty(4)
+    quaternion_product(delta, world_wxyz[joint], turned)
+    if joint == 0:
+        wxyz[joint, :] = turned
+        return
+    conjugate(world_wxyz[parents[joint]], inverse)
+    quaternion_product(inverse, turned, wxyz[joint])
+
+
+@kernel
+def arc(a, b, out):
+    """The shortest rotation between two directions (not opposite) as a quaternion."""
+    na = np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2) + TINY
+    nb = np.sqrt(b[0] ** 2 + b[1] ** 2 + b[2] ** 2) + TINY
+    out[1] = (a[1] * b[2] - a[2] * b[1]) / (na * nb)
+    out[2] = (a[2] * b[0] - a[0] * b[2]) / (na * nb)
+    out[3] = (a[0] * b[1] - a[1] * b[0]) / (na * nb)
+    out[0] = 1.0 + (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) / (na * nb)
+    n = np.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2 + out[3] ** 2) + TINY
+    for c in range(4):
+        out[c] /= n
+
+
+@kernel
+def reach(upper, middle, end, goal, parents, offsets, root, wxyz, position, world_wxyz):
+    """Two-bone inverse kinematics: bring joint ``end`` to ``goal`` [3], keep its world rotation.
+
+    The limb bends in the plane it bends in; out of reach it stretches towards the goal to 99.9 %.
+    Leaves local rotations, positions and world rotations up to date.
+    """
+    kept = world_wxyz[end].copy()
+    a = np.sqrt(np.sum((position[middle] - position[upper]) ** 2))
+    b = np.sqrt(np.sum((position[end] - position[middle]) ** 2))
+    now = np.sqrt(np.sum((position[end] - position[upper]) ** 2))
+    want = np.sqrt(np.sum((goal - position[upper]) ** 2))
+    longest = max(0.999 * (a + b), now)  # a straighter capture than that is not bent by force
+    want = min(max(want, abs(a - b) + 1e-4), longest)
+    cos_now = min(max((a * a + b * b - now * now) / (2 * a * b + TINY), -1.0), 1.0)
+    cos_want = min(max((a * a + b * b - want * want) / (2 * a * b + TINY), -1.0), 1.0)
+    bend = np.arccos(cos_now) - np.arccos(cos_want)
+    to_upper = position[upper] - position[middle]
+    to_end = position[end] - position[middle]
+    axis = np.cross(to_upper, to_end)
+    length = np.sqrt(np.sum(axis**2))
+    delta = np.empty(4)
+    if length < 1e-6 * a * b:
+        # A straight limb: bend about the joint's own side axis.
+        side = np.array([1.0, 0.0, 0.0])
+        add_rotated(world_wxyz[middle], side, np.zeros(3), axis)
+        length = np.sqrt(np.sum(axis**2))
+    exponential(axis * (-bend / length), delta)
+    turn_joint(middle, parents, delta, wxyz, world_wxyz)
+    forward_kinematics_frame(parents, offsets, root, wxyz, position, world_wxyz)
+    arc(position[end] - position[upper], goal - position[upper], delta)
+    turn_joint(upper, parents, delta, wxyz, world_wxyz)
+    forward_kinematics_frame(parents, offsets, root, wxyz, position, world_wxyz)
+    inverse = np.empty(4)
+    conjugate(world_wxyz[parents[end]], inverse)
+    quaternion_product(inverse, kept, wxyz[end])
+    forward_kinematics_frame(parents, offsets, root, wxyz, position, world_wxyz)
+
+
+@kernel
+def move_feet(foot_offset, foot_velocity, planted, half_life, longest, dt):
+    """Offsets of the two feet over one frame: held on the ground, faded in the air, in place.
+
+    An offset longer than ``longest`` [m] fades on the ground too: better a slip than a split.
+    """
+    for f in range(2):
+        # Height always fades: a foot must not stand in the air.
+        spring(foot_offset[f, 1:2], foot_velocity[f, 1:2], half_life, dt)
+        far = foot_offset[f, 0] ** 2 + foot_offset[f, 2] ** 2 > longest * longest
+        if planted[f] and not far:
+            foot_velocity[f, 0] = 0.0
+            foot_velocity[f, 2] = 0.0
+        else:
+            spring(foot_offset[f, 0:1], foot_velocity[f, 0:1], half_life, dt)
+            spring(foot_offset[f, 2:3], foot_velocity[f, 2:3], half_life, dt)
+
+
+@kernel
+def show_one(
+    k,
+    frame,
+    anchor,
+    dt,
+    half_life,
+    reaction_half_life,
+    longest_foot_offset,
+    library_root,
+    library_wxyz,
+    library_ankle,
+    library_contact,
+    parents,
+    offsets,
+    legs,
+    offset,
+    offset_velocity,
+    root_offset,
+    root_offset_velocity,
+    foot_offset,
+    foot_velocity,
+    reaction,
+    reaction_velocity,
+    root_position,
+    wxyz,
+    position,
+    world_wxyz,
+):
+    """One frame of character k of :func:`show`."""
+    f = frame[k]
+    spring(root_offset[k], root_offset_velocity[k], half_life, dt)
+    move_feet(
+        foot_offset[k], foot_velocity[k], library_contact[f], half_life, longest_foot_offset, dt
+    )
+    turn, held, pushed, base = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
+    for j in range(library_wxyz.shape[1]):
+        spring(offset[k, j], offset_velocity[k, j], half_life, dt)
+        spring(reaction[k, j], reaction_velocity[k, j], reaction_half_life, dt)
+        if j == 0:
+            anchored_root(anchor[k], library_root[f], library_wxyz[f, 0], root_position[k], base)
+        else:
+            base[:] = library_wxyz[f, j]
+        exponential(offset[k, j], held)
+        exponential(reaction[k, j], pushed)
+        quaternion_product(held, pushed, turn)
+        quaternion_product(base, turn, wxyz[k, j])
+    for c in range(3):
+        root_position[k, c] += root_offset[k, c]
+    forward_kinematics_frame(
+        parents, offsets, root_position[k], wxyz[k], position[k], world_wxyz[k]
+    )
+    goal = np.empty(3)
+    for s in range(2):
+        x, z = planar_point(anchor[k], library_ankle[f, s, 0], library_ankle[f, s, 2])
+        goal[0] = x + foot_offset[k, s, 0]
+        goal[1] = library_ankle[f, s, 1] + foot_offset[k, s, 1]
+        goal[2] = z + foot_offset[k, s, 2]
+        reach(
+            legs[s, 0],
+            legs[s, 1],
+            legs[s, 2],
+            goal,
+            parents,
+            offsets,
+            root_position[k],
+            wxyz[k],
+            position[k],
+            world_wxyz[k],
+        )
+
+
+@kernel
+def show(
+    frame,
+    anchor,
+    dt,
+    half_life,
+    reaction_half_life,
+    longest_foot_offset,
+    library_root,
+    library_wxyz,
+    library_ankle,
+    library_contact,
+    parents,
+    offsets,
+    legs,
+    offset,
+    offset_velocity,
+    root_offset,
+    root_offset_velocity,
+    foot_offset,
+    foot_velocity,
+    reaction,
+    reaction_velocity,
+    root_position,
+    wxyz,
+    position,
+    world_wxyz,
+):
+    """One frame of all K characters: offsets move on by dt, then poses are made and feet put down.
+
+    legs [2, 3]: thigh, shin and foot joints. Outputs root_position [K, 3], wxyz [K, J, 4],
+    position [K, J, 3], world_wxyz [K, J, 4].
+    """
+    for k in range(frame.shape[0]):
+        show_one(
+            k,
+            frame,
+            anchor,
+            dt,
+            half_life,
+            reaction_half_life,
+            longest_foot_offset,
+            library_root,
+            library_wxyz,
+            library_ankle,
+            library_contact,
+            parents,
+            offsets,
+            legs,
+            offset,
+            offset_velocity,
+            root_offset,
+            root_offset_velocity,
+            foot_offset,
+            foot_velocity,
+            reaction,
+            reaction_velocity,
+            root_position,
+            wxyz,
+            position,
+            world_wxyz,
+        )
+
+
+@parallel_kernel
+def show_many(
+    frame,
+    anchor,
+    dt,
+    half_life,
+    reaction_half_life,
+    longest_foot_offset,
+    library_root,
+    library_wxyz,
+    library_ankle,
+    library_contact,
+    parents,
+    offsets,
+    legs,
+    offset,
+    offset_velocity,
+    root_offset,
+    root_offset_velocity,
+    foot_offset,
+    foot_velocity,
+    reaction,
+    reaction_velocity,
+    root_position,
+    wxyz,
+    position,
+    world_wxyz,
+):
+    """:func:`show` on all cores: worth its start-up from ``MANY`` characters on."""
+    for k in prange(frame.shape[0]):
+        show_one(
+            k,
+            frame,
+            anchor,
+            dt,
+            half_life,
+            reaction_half_life,
+            longest_foot_offset,
+            library_root,
+            library_wxyz,
+            library_ankle,
+            library_contact,
+            parents,
+            offsets,
+            legs,
+            offset,
+            offset_velocity,
+            root_offset,
+            root_offset_velocity,
+            foot_offset,
+            foot_velocity,
+            reaction,
+            reaction_velocity,
+            root_position,
+            wxyz,
+            position,
+            world_wxyz,
+        )

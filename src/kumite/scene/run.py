@@ -1,0 +1,60 @@
+"""Run a scene without drawing and record it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from kumite.errors import KumiteError
+from kumite.scene.live import LiveScene
+from kumite.scene.metrics import source_skate
+from kumite.scene.recording import Recording
+
+
+def record(
+    scene: LiveScene, seconds: float, progress: Callable[[float], None] = lambda share: None
+) -> Recording:
+    """Step a scene for a time [s] and keep every frame and event. progress is told 0..1."""
+    if not (np.isfinite(seconds) and seconds > 0):
+        raise KumiteError(f"seconds: {seconds}, expected more than 0")
+    frames = max(1, round(seconds * scene.fps)) + 1
+    count, joints = len(scene.names), len(scene.skeleton)
+    root = np.empty((frames, count, 3), np.float32)
+    wxyz = np.empty((frames, count, joints, 4), np.float32)
+    contacts = np.empty((frames, count, 2), bool)
+    shown = np.empty((frames, count), np.int32)
+    things = np.empty((frames, len(scene.objects), 3), np.float32)
+    for f in range(frames):
+        if f:
+            scene.step()
+        root[f] = scene.root_position
+        wxyz[f] = scene.wxyz
+        contacts[f] = scene.cast.contacts
+        shown[f] = scene.cast.frame
+        for o, thing in enumerate(scene.objects):
+            things[f, o] = thing.position
+        if f % 256 == 0:
+            progress(f / frames)
+    progress(1.0)
+    return Recording(
+        scene=scene.title,
+        fps=scene.fps,
+        skeleton=scene.skeleton,
+        names=scene.names,
+        root_position=root,
+        wxyz=wxyz,
+        contacts=contacts,
+        library_frame=shown,
+        objects=tuple(thing.name for thing in scene.objects),
+        object_position=things,
+        events=tuple(scene.events),
+        settings={
+            "seed": scene.seed,
+            "library": scene.library.digest,
+            "source_skate_m_s": source_skate(scene.library),
+            "object_radius": {thing.name: thing.radius for thing in scene.objects},
+            "aims_at": {c.name: c.aims_at for c in scene.settings.character},
+            "scene": scene.settings.model_dump(mode="json"),
+        },
+    )

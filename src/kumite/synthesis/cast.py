@@ -1,0 +1,189 @@
+"""A cast: K characters played from a library, as arrays.
+
+Choices come in as stretches of the action table; poses come out. What happens every frame is one
+kernel over all characters; Python objects appear only where a character chooses or is struck.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kumite.clip import SIDES
+from kumite.graph import Library
+from kumite.kernels import character as kernels
+from kumite.kernels.blow import NO_BLOW
+from kumite.rotation import conjugate, planar_compose, planar_inverse, rotate
+
+JOIN_HALF_LIFE = 0.10  # s, in which half of the difference at a join is gone
+REACTION_HALF_LIFE = 0.16  # s, in which a struck body recovers half
+LONGEST_FOOT_OFFSET = 0.30  # m that a planted foot may stand away from where the capture has it
+BLOW_BEFORE, BLOW_AFTER = 0.07, 0.12  # s around the effective frames in which a blow may land
+SPINE_SHARES = 3.0  # how much more readily each joint up the spine gives way than the one below
+
+
+class Cast:
+    """K characters. Arrays named as in ``kernels/character.py``; outputs are overwritten a frame."""
+
+    def __init__(self, library: Library, count: int) -> None:
+        self.library = library
+        clips, skeleton = library.clips, library.clips.skeleton
+        joints = len(skeleton)
+        self.count = count
+        position, _ = clips.world
+        feet = [skeleton.joint(f"{side}_foot") for side in SIDES]
+        self._ankle = np.ascontiguousarray(position[:, feet])
+        self._legs = np.array(
+            [[skeleton.joint(f"{s}_{p}") for p in ("thigh", "shin", "foot")] for s in SIDES]
+        )
+        self.frame = np.zeros(count, dtype=np.int64)  # library frame shown
+        self.stop = np.zeros(count, dtype=np.int64)  # last frame of the action: choose again there
+        self.anchor = np.zeros((count, 3))  # library world → scene
+        self.root_position = np.zeros((count, 3))
+        self.wxyz = np.zeros((count, joints, 4))
+        self.wxyz[..., 0] = 1.0
+        self.position = np.zeros((count, joints, 3))
+        self.world_wxyz = self.wxyz.copy()
+        self._offset = np.zeros((count, joints, 3))
+        self._offset_velocity = np.zeros((count, joints, 3))
+        self._root_offset = np.zeros((count, 3))
+        self._root_offset_velocity = np.zeros((count, 3))
+        self._foot_offset = np.zeros((count, 2, 3))
+        self._foot_velocity = np.zeros((count, 2, 3))
+        self._reaction = np.zeros((count, joints, 3))
+        self._reaction_velocity = np.zeros((count, joints, 3))
+        self.blow_of_frame = _blow_windows(library)
+
+    @property
+    def contacts(self) -> np.ndarray:
+        """Which feet are planted now [K, 2] bool."""
+        return self.library.contacts.on_ground[self.frame]
+
+    @property
+    def facing(self) -> np.ndarray:
+        """Facing frames [K, 3] in the scene."""
+        return planar_compose(self.anchor, self.library.clips.facing[self.frame])
+
+    @property
+    def waiting(self) -> np.ndarray:
+        """Characters [..] whose action has ended: each must :meth:`begin` another before a step."""
+        return np.flatnonzero(self.frame >= self.stop)
+
+    def place(self, k: int, state: int, facing: np.ndarray) -> None:
+        """Put a character into a state (of the action table) at a facing frame, at rest."""
+        f = int(self.library.table.state_frame[state])
+        self.frame[k] = self.stop[k] = f
+        self.anchor[k] = planar_compose(facing, planar_inverse(self.library.clips.facing[f]))
+        for array in (
+            self._offset,
+            self._offset_velocity,
+            self._root_offset,
+            self._root_offset_velocity,
+            self._foot_offset,
+            self._foot_velocity,
+            self._reaction,
+            self._reaction_velocity,
+        ):
+            array[k] = 0.0
+
+    def begin(self, k: int, stretch: int) -> bool:
+        """Take an action from the state that the character is in; whether it is a jump."""
+        table, clips = self.library.table, self.library.clips
+        source, target = int(self.frame[k]), int(table.first[stretch]) - 1
+        self.stop[k] = table.last[stretch]
+        self.frame[k] = target
+        if target == source:
+            return False
+        kernels.join(
+            self.anchor[k],
+            source,
+            target,
+            clips.fps,
+            clips.root_position,
+            clips.wxyz,
+            clips.facing,
+            self._ankle,
+            clips.clip_of_frame,
+            self._offset[k],
+            self._offset_velocity[k],
+            self._root_offset[k],
+            self._root_offset_velocity[k],
+            self._foot_offset[k],
+        )
+        return True
+
+    def advance(self) -> None:
+        """Everyone one frame on, along the action begun."""
+        self.frame += 1
+        self.show(1.0 / self.library.clips.fps)
+
+    def show(self, dt: float) -> None:
+        """Make the poses of the frames that the characters are at, offsets moved on by dt [s]."""
+        clips = self.library.clips
+        show = kernels.show_many if self.count >= kernels.MANY else kernels.show
+        show(
+            self.frame,
+            self.anchor,
+            dt,
+            JOIN_HALF_LIFE,
+            REACTION_HALF_LIFE,
+            LONGEST_FOOT_OFFSET,
+            clips.root_position,
+            clips.wxyz,
+            self._ankle,
+            self.library.contacts.on_ground,
+            clips.skeleton.parents,
+            clips.skeleton.offsets,
+            self._legs,
+            self._offset,
+            self._offset_velocity,
+            self._root_offset,
+            self._root_offset_velocity,
+            self._foot_offset,
+            self._foot_velocity,
+            self._reaction,
+            self._reaction_velocity,
+            self.root_position,
+            self.wxyz,
+            self.position,
+            self.world_wxyz,
+        )
+
+    def shift(self, k: int, dx: float, dz: float) -> None:
+        """Carry a character over the ground [m]; planted feet stay where they are."""
+        self.anchor[k, 0] += dx
+        self.anchor[k, 1] += dz
+        self._foot_offset[k, :, 0] -= dx
+        self._foot_offset[k, :, 2] -= dz
+
+    def strike(self, k: int, joint: int, point: np.ndarray, displacement: np.ndarray) -> None:
+        """Displace a struck segment: ``point`` [3] moves by about ``displacement`` [3] and recovers.
+
+        One Jacobian step of inverse kinematics over the joints from the pelvis to the struck one,
+        the upper ones giving way more readily (Lee & Lee 2004, section 6, reaction), played by a
+        critically damped spring that peaks there.
+        """
+        skeleton = self.library.clips.skeleton
+        chain = skeleton.chain(skeleton.joint("pelvis"), joint)
+        if not chain:
+            return
+        arms = point - self.position[k, chain]
+        length2 = np.sum(arms**2, axis=1)
+        share = SPINE_SHARES ** np.arange(len(chain)) * length2
+        share = share / max(share.sum(), 1e-9)
+        turn = share[:, None] * np.cross(arms, displacement) / np.maximum(length2, 0.01)[:, None]
+        local = rotate(conjugate(self.world_wxyz[k, chain]), turn)
+        rate = 2.0 * np.log(2.0) / REACTION_HALF_LIFE
+        self._reaction_velocity[k, chain] += local * np.e * rate
+
+
+def _blow_windows(library: Library) -> np.ndarray:
+    """The blow [F, 4] int32 that each limb throws at a frame, or NO_BLOW."""
+    strikes, clips = library.strikes, library.clips
+    out = np.full((len(clips), 4), NO_BLOW, dtype=np.int32)
+    before, after = round(BLOW_BEFORE * clips.fps), round(BLOW_AFTER * clips.fps)
+    for x in range(len(strikes)):
+        c = clips.clip_of_frame[strikes.frame[x]]
+        low = max(int(strikes.start[x]) - before, int(clips.clip_start[c]))
+        high = min(int(strikes.stop[x]) + after, int(clips.clip_start[c + 1]))
+        out[low:high, strikes.limb[x]] = x
+    return out
