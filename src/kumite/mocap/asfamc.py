@@ -32,9 +32,7 @@ from kumite.mocap.raw import RawMotion
 DOFS = ("tx", "ty", "tz", "rx", "ry", "rz", "l")
 USUAL_FPS = 120.0  # of CMU's database, whose AMC files do not say
 INCH = 0.0254  # m; ASF lengths are inches once divided by the header's `length`
-_SECTIONS = tuple(
-    ":version :name :units :documentation :root :bonedata :hierarchy :skin".split()
-)
+_SECTIONS = tuple(":version :name :units :documentation :root :bonedata :hierarchy :skin".split())
 _ROOT_KEYS = "order, axis, position or orientation"
 _BONE_KEYS = "id, name, direction, length, axis, bodymass, cofmass, dof, limits or end"
 
@@ -171,7 +169,8 @@ class _Asf:
                 section = words[0].lower()
                 if section not in _SECTIONS:
                     raise self.error(
-                        line, f"unknown section {text.shown(words[0])}; expected {', '.join(_SECTIONS)}"
+                        line,
+                        f"unknown section {text.shown(words[0])}; expected {', '.join(_SECTIONS)}",
                     )
                 self.seen.add(section)
             elif section == ":units":
@@ -195,7 +194,9 @@ class _Asf:
             elif not section:
                 raise self.error(line, f"unexpected {text.shown(words[0])}; expected :version")
         if bone is not None:
-            raise self.error(line, f"the file ends inside bone {text.shown(bone.name)}; expected end")
+            raise self.error(
+                line, f"the file ends inside bone {text.shown(bone.name)}; expected end"
+            )
         for needed in (":bonedata", ":hierarchy"):
             if needed not in self.seen:
                 raise self.error(line, f"the file ends without {needed}")
@@ -271,13 +272,15 @@ def read_asf(path: Path | str) -> AsfSkeleton:
 
 
 def _fixed_axes(order: str, xyz: np.ndarray) -> np.ndarray:
-    """Turns by angles [3] [rad] about fixed axes; the values come in the order of ``order``.
+    """Turns about fixed axes by angles about x, y and z [3] [rad], applied in this order.
 
-    For the usual XYZ order, x first: Rz Ry Rx.
+    For the usual XYZ, x first: Rz Ry Rx. The values are x, y, z whatever the order, as those of
+    the root's orientation are.
     """
     q = rotation.IDENTITY_WXYZ
-    for axis, angle in zip(order, xyz):
-        q = rotation.multiply(rotation.from_axis_angle(np.eye(3)["xyz".index(axis)], angle), q)
+    for axis in order:
+        k = "xyz".index(axis)
+        q = rotation.multiply(rotation.from_axis_angle(np.eye(3)[k], xyz[k]), q)
     return q
 
 
@@ -334,9 +337,7 @@ def read_amc(path: Path | str, asf: AsfSkeleton, fps: float | None = None) -> Ra
     )
 
 
-def _amc_header(
-    path: Path, header: str, radians: bool
-) -> tuple[float | None, bool, int | None]:
+def _amc_header(path: Path, header: str, radians: bool) -> tuple[float | None, bool, int | None]:
     """Frames a second (None: not said), whether angles are in radians, frames declared."""
     fps: float | None = None
     frames: int | None = None
@@ -351,7 +352,9 @@ def _amc_header(
         elif key == ":FRAME-RANGE":
             match = re.fullmatch(r"(\d{1,9})\s*-?\s*(\d{1,9})", " ".join(rest), re.ASCII)
             if match is None or int(match[2]) < int(match[1]):
-                raise at(path, line, f"frame range {text.shown(' '.join(rest))}; expected like 1-120")
+                raise at(
+                    path, line, f"frame range {text.shown(' '.join(rest))}; expected like 1-120"
+                )
             frames = int(match[2]) - int(match[1]) + 1
         elif key in (":DEGREES", ":RADIANS"):
             radians = key == ":RADIANS"

@@ -108,7 +108,9 @@ def _hierarchy(path: Path, header: str, *, complete: bool) -> list[_Joint]:
         elif key in ("JOINT", "END"):
             parent = open_[-1][0]
             if parent == _END_SITE:
-                raise at(path, line, f"{text.shown(word)} inside an End Site; expected OFFSET or '}}'")
+                raise at(
+                    path, line, f"{text.shown(word)} inside an End Site; expected OFFSET or '}}'"
+                )
             if key == "JOINT":
                 joints.append(_Joint(_name(path, line, rest), parent, line))
                 opens_next = len(joints) - 1
@@ -221,7 +223,9 @@ def _motion_header(path: Path, data: bytes, start: int) -> tuple[int, tuple[floa
                 pattern = rb"\s*" + key.replace(" ", r"\s+").encode() + rb"\s*:\s*(\S+)\s*"
                 match = re.fullmatch(pattern, row, re.IGNORECASE)
                 if match is None:
-                    raise at(path, line, f"unexpected {text.shown(row.strip())}; expected '{key}: …'")
+                    raise at(
+                        path, line, f"unexpected {text.shown(row.strip())}; expected '{key}: …'"
+                    )
                 value = match.group(1).decode("utf-8", "replace")
         found.append((line, value))
     (frames_line, frames), (time_line, time) = found

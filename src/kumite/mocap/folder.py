@@ -130,7 +130,11 @@ def load(
         up_axis = up_axis.upper()
         if up_axis not in UP_AXES:
             raise KumiteError(f"up axis {up_axis!r}; expected one of {', '.join(UP_AXES)}")
-    for what, number in (("fps", fps), ("file_fps", file_fps), ("metres_per_unit", metres_per_unit)):
+    for what, number in (
+        ("fps", fps),
+        ("file_fps", file_fps),
+        ("metres_per_unit", metres_per_unit),
+    ):
         if number is not None and not (np.isfinite(number) and number > 0):
             raise KumiteError(f"{what} {number}; expected a number more than 0")
     if ground is not None and not np.isfinite(ground):
@@ -333,7 +337,9 @@ def _inferred(
     for take in session:
         take.facts.append(_rate_fact(take))
         if take.raw.skeleton_source is not None:
-            take.facts.append(Fact("skeleton", take.raw.skeleton_source.name, "inferred", "its name"))
+            take.facts.append(
+                Fact("skeleton", take.raw.skeleton_source.name, "inferred", "its name")
+            )
         try:
             scale = settle(
                 take, "metres_per_unit", "", lambda: infer.metres_per_unit(first.raw, joints)
@@ -374,7 +380,9 @@ def _role_facts(take: _Take) -> list[Fact]:
     )
     facts = []
     for source, how, why in sources:
-        pairs = [f"{r}={names[j]}" for r, j in take.roles.joints.items() if take.roles.how[r] == source]
+        pairs = [
+            f"{r}={names[j]}" for r, j in take.roles.joints.items() if take.roles.how[r] == source
+        ]
         if pairs:
             facts.append(Fact("roles", ", ".join(pairs), how, why))
     return facts

@@ -120,7 +120,11 @@ def _main_chain(
         chain.append(max(children[chain[-1]], key=lambda c: size[c]))
     shortest = _SHORT * lengths.max()
     # Of joints in one place the last turns the bone below.
-    return [j for j, after in zip(chain, [*chain[1:], None]) if after is None or lengths[after] > shortest]
+    return [
+        j
+        for j, after in zip(chain, [*chain[1:], None])
+        if after is None or lengths[after] > shortest
+    ]
 
 
 def _twins(a: list[int], b: list[int], lengths: np.ndarray) -> bool:

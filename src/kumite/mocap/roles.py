@@ -149,7 +149,16 @@ def _by_names(skeleton: Skeleton) -> dict[str, int]:
         # Clear words of every role come before the ambiguous words of any: LeftShoulder is a
         # clavicle above LeftArm and an upper arm above LeftElbow; LeftLeg a shin below LeftUpLeg.
         for last in (False, True):
-            for role in ("upper_arm", "forearm", "hand", "clavicle", "thigh", "shin", "foot", "toe"):
+            for role in (
+                "upper_arm",
+                "forearm",
+                "hand",
+                "clavicle",
+                "thigh",
+                "shin",
+                "foot",
+                "toe",
+            ):
                 words = sided[role]
                 clear = words if last else [w for w in words if w not in _AMBIGUOUS]
                 joint = next(
@@ -220,9 +229,7 @@ def _limb_gaps(skeleton: Skeleton, joints: Mapping[str, int], side: str) -> dict
     return found
 
 
-def _by_limbs(
-    skeleton: Skeleton, limbs: Limbs | None, joints: Mapping[str, int]
-) -> dict[str, int]:
+def _by_limbs(skeleton: Skeleton, limbs: Limbs | None, joints: Mapping[str, int]) -> dict[str, int]:
     """Roles of a skeleton whose names say too little, unless names contradict its shape."""
     if limbs is None:
         return {}

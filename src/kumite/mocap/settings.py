@@ -93,7 +93,9 @@ def read_settings(folder: Path) -> FolderSettings | None:
     for name in settings.files:
         if not (folder / name).is_file():
             raise at(
-                path, _line_of(source, name), f"files.{name!r}: no such file; expected a path below {folder}"
+                path,
+                _line_of(source, name),
+                f"files.{name!r}: no such file; expected a path below {folder}",
             )
     return settings
 

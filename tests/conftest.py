@@ -1,0 +1,19 @@
+"""What the tests share."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def mocap() -> Path:
+    """The folder of real motion capture; skips without it, fails without it on CI."""
+    where = os.environ.get("KUMITE_MOCAP")
+    if where and Path(where).is_dir():
+        return Path(where)
+    if os.environ.get("CI"):
+        pytest.fail("KUMITE_MOCAP must name the folder of motion capture on CI")
+    pytest.skip("KUMITE_MOCAP does not name a folder of motion capture")
