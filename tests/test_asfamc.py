@@ -10,9 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from kumite import rotation
 from kumite.clip import forward_kinematics
 from kumite.errors import KumiteError
 from kumite.mocap.asfamc import read_amc, read_asf
+from kumite.mocap.bvh import read_bvh
 from kumite.mocap.raw import RawMotion
 
 ASF = """# made by hand
@@ -172,8 +174,6 @@ def compare(raw: RawMotion, slow: list[dict[str, tuple[np.ndarray, np.ndarray]]]
         for j, name in enumerate(raw.skeleton.names):
             np.testing.assert_allclose(fast[f, j], ends[name][0], atol=1e-9)
             if j in tip_of:
-                from kumite import rotation
-
                 end = fast[f, j] + rotation.rotate(world[f, j], tip_of[j])
                 np.testing.assert_allclose(end, ends[name][1], atol=1e-9)
 
@@ -210,12 +210,15 @@ def test_radians_are_the_same_motion(tmp_path: Path) -> None:
         words = line.split()
         if words and words[0] in ("root", "upper", "lower"):
             k = 4 if words[0] == "root" else 1
-            words[k:] = [repr(float(np.radians(float(w)))) for w in words[k:]]
+            turned = [repr(float(np.radians(float(w)))) for w in words[k:]]
+            words = [str(w) for w in words[:k]] + turned
         lines.append(" ".join(words))
     radians = read(tmp_path, amc="\n".join(lines))
     np.testing.assert_allclose(radians.wxyz, degrees.wxyz, atol=1e-12)
     unsaid = ASF.replace("deg", "rad").replace("0 0 90 XYZ", "0 0 1.5707963267948966 XYZ")
-    unsaid = unsaid.replace("30 -40 50", " ".join(repr(float(np.radians(a))) for a in (30, -40, 50)))
+    unsaid = unsaid.replace(
+        "30 -40 50", " ".join(repr(float(np.radians(a))) for a in (30, -40, 50))
+    )
     both = read(tmp_path, unsaid, "\n".join(lines).replace(":RADIANS", ""))
     np.testing.assert_allclose(both.wxyz, degrees.wxyz, atol=1e-12)
 
@@ -256,8 +259,6 @@ def test_what_is_left_out_is_said(tmp_path: Path) -> None:
 
 def test_bvh_and_asf_of_one_performer_agree(mocap: Path) -> None:
     """Seoul's skeleton comes in both formats: the same joints in the same places at rest."""
-    from kumite.mocap.bvh import read_bvh
-
     ours = read_asf(mocap / "woody/woody.asf").skeleton
     theirs = read_bvh(mocap / "woody/idle_65.bvh").skeleton
     index = {n.lower(): j for j, n in enumerate(theirs.names)} | {"root": 0}
@@ -281,21 +282,48 @@ BAD_ASF = {
     "nothing": (lambda s: "", "the file is empty"),
     "cut": (lambda s: s[: s.index("  length 3")], "ends inside bone 'lower'; expected end"),
     "no hierarchy": (lambda s: s.split(":hierarchy")[0], "ends without :hierarchy"),
-    "unclosed": (lambda s: s.replace("  end\n:hierarchy", ":hierarchy"), ":hierarchy' inside a bone"),
-    "section": (lambda s: s.replace(":name", ":nam"), ":3: unknown section ':nam'; expected :version"),
-    "key": (lambda s: s.replace("length 2", "lenth 2"), ":20: unknown key 'lenth'; expected id, name"),
+    "unclosed": (
+        lambda s: s.replace("  end\n:hierarchy", ":hierarchy"),
+        ":hierarchy' inside a bone",
+    ),
+    "section": (
+        lambda s: s.replace(":name", ":nam"),
+        ":3: unknown section ':nam'; expected :version",
+    ),
+    "key": (
+        lambda s: s.replace("length 2", "lenth 2"),
+        ":20: unknown key 'lenth'; expected id, name",
+    ),
     "number": (lambda s: s.replace("length 2", "length two"), ":20: 'two' is not a number"),
     "nan": (lambda s: s.replace("length 2", "length nan"), ":20: 'nan' is not a number"),
-    "direction": (lambda s: s.replace("direction 0 1 0", "direction 0 1"), "with 2 values; expected 3"),
-    "axis": (lambda s: s.replace("90 XYZ", "90 XYX"), "axis order 'XYX'; expected XYZ in some order"),
-    "dof": (lambda s: s.replace("rz rx", "rz rw"), "unknown degree of freedom 'rw'; expected tx, ty"),
+    "direction": (
+        lambda s: s.replace("direction 0 1 0", "direction 0 1"),
+        "with 2 values; expected 3",
+    ),
+    "axis": (
+        lambda s: s.replace("90 XYZ", "90 XYX"),
+        "axis order 'XYX'; expected XYZ in some order",
+    ),
+    "dof": (
+        lambda s: s.replace("rz rx", "rz rw"),
+        "unknown degree of freedom 'rw'; expected tx, ty",
+    ),
     "dof twice": (lambda s: s.replace("rz rx", "rz rz"), "degrees of freedom twice"),
-    "angle": (lambda s: s.replace("angle deg", "angle grad"), ":7: angle 'grad'; expected deg or rad"),
-    "length": (lambda s: s.replace("length 0.45", "length 0"), ":6: length '0'; expected more than 0"),
+    "angle": (
+        lambda s: s.replace("angle deg", "angle grad"),
+        ":7: angle 'grad'; expected deg or rad",
+    ),
+    "length": (
+        lambda s: s.replace("length 0.45", "length 0"),
+        ":6: length '0'; expected more than 0",
+    ),
     "bone twice": (lambda s: s.replace("name fixed", "name upper"), "bone 'upper' twice"),
     "unnamed": (lambda s: s.replace("    name upper\n", ""), "a bone without a name"),
     "unknown": (lambda s: s.replace("fixed lower", "fixed lowr"), "'lowr'; did you mean 'lower'"),
-    "loop": (lambda s: s.replace("fixed lower", "fixed lower upper"), "'upper' has a parent already"),
+    "loop": (
+        lambda s: s.replace("fixed lower", "fixed lower upper"),
+        "'upper' has a parent already",
+    ),
     "adrift": (lambda s: s.replace("    fixed lower\n", ""), "hang on nothing: lower"),
 }
 
@@ -316,12 +344,18 @@ BAD_AMC = {
         "frame 3 ends with 2 bones; expected the 3 of the first .differs in lower",
     ),
     "bone": (lambda s: s.replace("upper 90", "uper 90"), ":11: unknown bone 'uper'; did you mean"),
-    "count": (lambda s: s.replace("upper 90 0 0", "upper 90 0"), ":11: 'upper' with 2 values; expected 3"),
+    "count": (
+        lambda s: s.replace("upper 90 0 0", "upper 90 0"),
+        ":11: 'upper' with 2 values; expected 3",
+    ),
     "number": (lambda s: s.replace("upper 90", "upper x"), ":11: 'x' is not a number"),
     "nan": (lambda s: s.replace("upper 90", "upper nan"), ":11: 'nan' is not a number"),
     "inf": (lambda s: s.replace("upper 90", "upper 1e400"), ":11: '1e400' is beyond"),
     "frame left out": (lambda s: s.replace("\n2\n", "\n4\n"), ":9: frame '4' after 1; expected 2"),
-    "bone twice": (lambda s: s.replace("lower 15", "upper 0 0 0\nlower 15"), "'upper' twice in a frame"),
+    "bone twice": (
+        lambda s: s.replace("lower 15", "upper 0 0 0\nlower 15"),
+        "'upper' twice in a frame",
+    ),
     "no root": (lambda s: s.replace("root 1 2 3 10 20 30\n", ""), "ends without 'root'"),
     "no frame number": (lambda s: s.replace("60\n1\n", "60\n"), ":5: unexpected 'root'"),
     "range": (lambda s: ":FRAME-RANGE 1-9\n" + s, "3 frames; expected 9, as :FRAME-RANGE declares"),
@@ -351,7 +385,9 @@ def test_deep_skeletons_are_not_recursion(tmp_path: Path) -> None:
     assert len(raw.skeleton) == count + 1
 
 
-PIECES = st.sampled_from(["", " ", "\n", "-", "9", "#", ":", "nan", "1e300", "root", "begin\n", "end"])
+PIECES = st.sampled_from(
+    ["", " ", "\n", "-", "9", "#", ":", "nan", "1e300", "root", "begin\n", "end"]
+)
 
 
 @settings(max_examples=250, deadline=None)

@@ -1,4 +1,4 @@
-"""BVH in and out: known answers by hand, every kind of damage, and reading back what was written."""
+"""BVH in and out: known answers by hand, every kind of damage, reading back what was written."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from kumite import rotation
 from kumite.clip import Clip, Skeleton, forward_kinematics
 from kumite.errors import KumiteError
 from kumite.export.bvh import ORDERS, write_bvh
@@ -444,8 +445,6 @@ def test_write_read_write_is_stable(
     # Whole quarter turns and nearly so: where Euler angles are at their worst.
     quarters = rng.integers(-4, 5, (30, 2, 3)) * 90.0
     angles = quarters + rng.choice([0, 1e-12, 1e-7, 1e-5, 1e-3, 10], (30, 2, 3))
-    from kumite import rotation
-
     clip = Clip(
         "x",
         skeleton,

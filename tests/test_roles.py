@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from kumite import rotation
 from kumite.clip import LEG_ROLES, REQUIRED_ROLES, ROLES, SIDES, Skeleton
 from kumite.errors import KumiteError
 from kumite.mocap.asfamc import read_asf
 from kumite.mocap.bvh import read_bvh
 from kumite.mocap.roles import find_roles, split_name
 
-# What each family calls: root and spine up to the chest, neck, head, then a left arm and a left leg.
+# What each family calls root and spine up to the chest, neck, head, a left arm and a left leg.
 FAMILIES: dict[str, tuple[list[str], list[str], list[str], list[str]]] = {
     "mixamo": (
         ["mixamorig:Hips", "mixamorig:Spine", "mixamorig:Spine1", "mixamorig:Spine2"],
@@ -136,8 +137,6 @@ def test_shape_alone_finds_the_limbs(family: str) -> None:
 
 
 def test_shape_tells_left_from_right_whichever_way_the_body_lies() -> None:
-    from kumite import rotation
-
     skeleton = person("lafan1")
     silent = replace(skeleton, names=tuple(f"joint{k}" for k in range(len(skeleton))))
     lying = replace(silent, offsets=rotation.rotate(rotation.exp([1.2, -0.4, 2.0]), silent.offsets))

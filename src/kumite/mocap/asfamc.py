@@ -32,7 +32,9 @@ from kumite.mocap.raw import RawMotion
 DOFS = ("tx", "ty", "tz", "rx", "ry", "rz", "l")
 USUAL_FPS = 120.0  # of CMU's database, whose AMC files do not say
 INCH = 0.0254  # m; ASF lengths are inches once divided by the header's `length`
-_SECTIONS = tuple(":version :name :units :documentation :root :bonedata :hierarchy :skin".split())
+_SECTIONS = tuple(
+    [":version", ":name", ":units", ":documentation", ":root", ":bonedata", ":hierarchy", ":skin"]
+)
 _ROOT_KEYS = "order, axis, position or orientation"
 _BONE_KEYS = "id, name, direction, length, axis, bodymass, cofmass, dof, limits or end"
 
@@ -248,9 +250,8 @@ def read_asf(path: Path | str) -> AsfSkeleton:
     for j, parent in enumerate(parents):
         if parent not in (NO_PARENT, 0):
             offsets[j] = ends[parent]
-    leaves = [
-        j for j in range(1, len(bones)) if j not in set(parents) and np.any(np.abs(ends[j]) > 0)
-    ]
+    inner = set(parents)
+    leaves = [j for j in range(1, len(bones)) if j not in inner and np.any(ends[j] != 0)]
     skeleton = Skeleton(
         tuple(b.name for b in bones),
         np.array(parents),

@@ -319,7 +319,9 @@ def _inferred(
     shared: dict[Any, Any] = {}
 
     def settle(take: _Take, key: str, unit: str, guess: Any, among: tuple[Any, ...] = ()) -> Any:
-        for how, source in (("given", given), ("settings", take.said)):
+        sources: tuple[tuple[How, Mapping[str, Any]], ...]
+        sources = (("given", given), ("settings", take.said))
+        for how, source in sources:
             if key in source:
                 value = float(source[key]) if key != "up_axis" else source[key]
                 take.facts.append(Fact(key, f"{_short(value)}{unit}", how))
@@ -327,8 +329,8 @@ def _inferred(
         if (key, *among) not in shared:
             shared[(key, *among)] = guess(*among)
         inferred = shared[(key, *among)]
-        how = "stated" if inferred.stated else "inferred"
-        take.facts.append(Fact(key, f"{_short(inferred.value)}{unit}", how, inferred.why))
+        known: How = "stated" if inferred.stated else "inferred"
+        take.facts.append(Fact(key, f"{_short(inferred.value)}{unit}", known, inferred.why))
         return inferred.value
 
     first = session[0]

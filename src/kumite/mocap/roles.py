@@ -129,7 +129,7 @@ def split_name(name: str) -> tuple[str, str | None]:
 
 
 def _by_names(skeleton: Skeleton) -> dict[str, int]:
-    """Roles that names settle; ambiguous parts (shoulder, hip, leg) are settled by their company."""
+    """Roles that names settle; ambiguous parts (shoulder, hip, leg) by their company."""
     parts: dict[tuple[str | None, str], int] = {}
     for j, name in enumerate(skeleton.names):
         part, side = split_name(name)
