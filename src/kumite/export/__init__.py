@@ -1,1 +1,1 @@
-"""."""
+"""Recordings and clips leave Kumite: GLB, BVH, pictures."""

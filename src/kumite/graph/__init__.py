@@ -1,5 +1,6 @@
 """The motion graph: pose distance, transitions, components, the action table, the library file."""
 
+from kumite.graph.builtin import builtin_library
 from kumite.graph.distance import PoseFeatures, pose_features
 from kumite.graph.library import Library, build_library, load_library, save_library
 from kumite.graph.table import ActionTable, fold
@@ -11,6 +12,7 @@ __all__ = [
     "PoseFeatures",
     "Transitions",
     "build_library",
+    "builtin_library",
     "find_transitions",
     "fold",
     "load_library",

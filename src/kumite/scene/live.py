@@ -85,7 +85,7 @@ class LiveScene:
         self._head_joint, self._head_offset = joint, middle
         self._head = position[:, joint] + rotate(world[:, joint], middle)  # [F, 3] library world
         self.tempers = [
-            Temper(c.approach, c.strike, few=c.few, personal_space=c.personal_space)
+            Temper(c.approach, c.strike, c.facing, c.few, personal_space=c.personal_space)
             for c in settings.character
         ]
         self.reset(seed)

@@ -6,7 +6,7 @@ The studio plays it, exporters write it, metrics measure it. The same seed gives
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from kumite import files
 from kumite.clip import Clip, Skeleton
-from kumite.errors import KumiteError
+from kumite.errors import KumiteError, unknown
 
 KIND = "recording"
 VERSION = 1
@@ -86,10 +86,22 @@ class Recording:
 
     def character(self, name: str) -> int:
         if name not in self.names:
-            from kumite.errors import unknown
-
             raise unknown("character", name, self.names)
         return self.names.index(name)
+
+    def only(self, name: str) -> Recording:
+        """The recording with one character alone."""
+        k = self.character(name)
+        one = slice(k, k + 1)
+        return replace(
+            self,
+            names=(name,),
+            root_position=self.root_position[:, one],
+            wxyz=self.wxyz[:, one],
+            contacts=self.contacts[:, one],
+            library_frame=self.library_frame[:, one],
+            events=tuple(e for e in self.events if e.character == name),
+        )
 
     def clip(self, name: str) -> Clip:
         """One character's motion as a clip."""

@@ -1,0 +1,38 @@
+"""The library of the built-in performer: made on first use, then found in the user's cache."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+
+from kumite import performer
+from kumite.clip import concatenate
+from kumite.errors import KumiteError
+from kumite.graph.library import VERSION, Library, build_library, load_library, save_library
+
+FPS = 60.0
+
+
+def builtin_library(
+    cache: Path | None, progress: Callable[[str], None] = lambda stage: None
+) -> Library:
+    """The built-in performer's motion graph, kept in ``cache`` under the content of its clips."""
+    progress("performing")
+    clips = concatenate(performer.perform().clips, FPS)
+    h = hashlib.sha256(f"{VERSION}".encode())
+    h.update(clips.root_position.tobytes())
+    h.update(clips.wxyz.tobytes())
+    path = None if cache is None else cache / f"performer-{h.hexdigest()[:16]}.kumite"
+    if path is not None and path.exists():
+        try:
+            return load_library(path)
+        except KumiteError:
+            pass  # damaged or of another version: made anew
+    library = build_library(clips, progress=progress)
+    if path is not None:
+        try:
+            save_library(path, library)
+        except KumiteError:
+            pass  # a cache that cannot be written only costs time
+    return library
