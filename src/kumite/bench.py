@@ -1,0 +1,266 @@
+"""The figures: how fast, how much memory, how good. Printed by ``kumite bench``, asserted nowhere.
+
+Each figure runs in a process of its own, so that its peak memory is its own, and once before it is
+timed, so that compiled kernels are at hand ("from nothing compiled" says so and does not).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kumite.errors import KumiteError
+
+REPEATS = 3
+SPARRING_SEEDS = range(5)
+SPARRING_SECONDS = 60.0
+_FIGURES: dict[str, tuple[Callable[[Path], float], str, float | None]] = {}
+
+
+def _figure(name: str, unit: str, limit: float | None = None):
+    def register(function: Callable[[Path], float]) -> Callable[[Path], float]:
+        _FIGURES[name] = (function, unit, limit)
+        return function
+
+    return register
+
+
+def _best(work: Callable[[], Any]) -> float:
+    """Seconds of the fastest of a few runs, after one that is not timed."""
+    work()
+    times = []
+    for _ in range(REPEATS):
+        begin = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - begin)
+    return min(times)
+
+
+@cache
+def _clips(folder: Path):
+    from kumite import mocap
+
+    return mocap.load(folder).clip_set()
+
+
+@cache
+def _library(folder: Path):
+    from kumite.graph import build_library
+
+    return build_library(_clips(folder))
+
+
+@_figure("read the boxer folder", "s", 1.0)
+def _read(folder: Path) -> float:
+    from kumite import mocap
+
+    return _best(lambda: mocap.load(folder).clip_set())
+
+
+@_figure("read AMC", "frames/s", 20_000)
+def _read_amc(folder: Path) -> float:
+    from kumite import mocap
+
+    found = sorted(folder.parent.glob("cmu/*/*.amc"), key=lambda p: -p.stat().st_size)[:4]
+    if not found:
+        return float("nan")
+    frames = sum(i.frames for i in mocap.load(found).info)
+    return frames / _best(lambda: mocap.load(found))
+
+
+@_figure("notes: contacts and hits", "s", 0.5)
+def _notes(folder: Path) -> float:
+    from dataclasses import replace
+
+    from kumite.annotate import find_contacts, find_strikes
+
+    def work() -> None:
+        clips = replace(_clips(folder))  # a copy without the kinematics worked out before
+        find_contacts(clips)
+        find_strikes(clips)
+
+    return _best(work)
+
+
+@_figure("distance stage", "frame pairs/s", 1.5e8)
+def _distance(folder: Path) -> float:
+    from kumite.graph import pose_features
+    from kumite.kernels.distance import row_sums
+
+    f = pose_features(_clips(folder))
+    out = np.empty(len(_clips(folder)))
+    return len(out) ** 2 / _best(lambda: row_sums(f.quaternion, f.weight, f.euclidean, out))
+
+
+@_figure("graph, joins at left lift-off", "s", 5.0)
+def _graph(folder: Path) -> float:
+    from kumite.graph import build_library
+
+    return _best(lambda: build_library(_clips(folder)))
+
+
+@_figure("graph, all pairs of frames", "s", 5.0)
+def _whole_graph(folder: Path) -> float:
+    from kumite.graph import build_library
+
+    return _best(lambda: build_library(_clips(folder), event="none"))
+
+
+def _solve(folder: Path, name: str):
+    from kumite.control import approach, solve, strike
+
+    library = _library(folder)
+    behaviour = approach() if name == "approach" else strike(library)
+    return solve(library, behaviour)
+
+
+@_figure("approach policy to 1e-4", "s", 1.0)
+def _approach(folder: Path) -> float:
+    return _best(lambda: _solve(folder, "approach"))
+
+
+@_figure("strike policy to 1e-4", "s", 5.0)
+def _strike(folder: Path) -> float:
+    return _best(lambda: _solve(folder, "strike"))
+
+
+@_figure("Bellman backups, strike policy", "backups/s")
+def _backups(folder: Path) -> float:
+    backups = _solve(folder, "strike").backups
+    return backups / _best(lambda: _solve(folder, "strike"))
+
+
+def _sparring(folder: Path):
+    from kumite.scene import LiveScene, load_scene
+
+    return LiveScene(load_scene("sparring"), _library(folder))
+
+
+@_figure("run sparring", "× real time", 50.0)
+def _run(folder: Path) -> float:
+    from kumite.scene import record
+
+    scene = _sparring(folder)
+
+    def work() -> None:
+        scene.reset(1)
+        record(scene, SPARRING_SECONDS)
+
+    return SPARRING_SECONDS / _best(work)
+
+
+@cache
+def _fights(folder: Path):
+    from kumite.scene import measure, record
+
+    scene = _sparring(folder)
+    found = []
+    for seed in SPARRING_SEEDS:
+        scene.reset(seed)
+        found.append(measure(record(scene, SPARRING_SECONDS)))
+    return found
+
+
+@_figure("sparring: hits landed by the lesser boxer, least of five minutes", "hits/10 s", 1.0)
+def _landed(folder: Path) -> float:
+    return min(c.landed for m in _fights(folder) for c in m.characters) * 10 / SPARRING_SECONDS
+
+
+@_figure("sparring: foot skate over the source's, worst", "ratio", 1.5)
+def _skate(folder: Path) -> float:
+    return max(c.skate_ratio or 0.0 for m in _fights(folder) for c in m.characters)
+
+
+@_figure("sparring: smallest distance between bodies", "m", 0.25)
+def _separation(folder: Path) -> float:
+    return min(m.min_separation_m or 0.0 for m in _fights(folder))
+
+
+@_figure("sparring: facing the other within 45°, worst", "share", 0.8)
+def _facing(folder: Path) -> float:
+    return min(c.facing_share or 0.0 for m in _fights(folder) for c in m.characters)
+
+
+@_figure("sparring: largest jump of root speed at a join", "m/s", 0.3)
+def _jump(folder: Path) -> float:
+    return max(c.join_jump_m_s for m in _fights(folder) for c in m.characters)
+
+
+@_figure("kumite build from nothing compiled", "s", 90.0)
+def _cold(folder: Path) -> float:
+    with tempfile.TemporaryDirectory() as scratch:
+        environment = {**os.environ, "NUMBA_CACHE_DIR": f"{scratch}/numba"}
+        command = [sys.executable, "-m", "kumite", "build", str(folder)]
+        begin = time.perf_counter()
+        subprocess.run(
+            [*command, "-o", f"{scratch}/cold.kumite"],
+            env=environment,
+            check=True,
+            capture_output=True,
+        )
+        return time.perf_counter() - begin
+
+
+def default_folder(scratch: Path) -> Path:
+    """The boxer's clips where KUMITE_MOCAP says, else the built-in performer's, written as BVH."""
+    root = os.environ.get("KUMITE_MOCAP")
+    if root and (Path(root) / "boxer").is_dir():
+        return Path(root) / "boxer"
+    from kumite import performer
+    from kumite.export.bvh import write_bvh
+
+    for clip in performer.perform().clips:
+        write_bvh(scratch / f"{clip.name}.bvh", clip)
+    return scratch
+
+
+def run_all(
+    folder: Path | None, only: str | None, progress: Callable[[str], None]
+) -> list[dict[str, Any]]:
+    """Every figure (whose name holds ``only``) as {"name", "value", "unit", "limit", "peak_mb"}.
+
+    A limit is what is wanted: at most, for seconds, ratios and jumps; at least, for the others.
+    """
+    names = [n for n in _FIGURES if only is None or only in n]
+    if not names:
+        raise KumiteError(f"no figure has {only!r} in its name; expected one of {list(_FIGURES)}")
+    rows = []
+    with tempfile.TemporaryDirectory() as scratch:
+        chosen = folder or default_folder(Path(scratch))
+        for name in names:
+            progress(name)
+            done = subprocess.run(
+                [sys.executable, "-m", "kumite.bench", name, str(chosen)],
+                capture_output=True,
+                text=True,
+            )
+            if done.returncode:
+                raise KumiteError(f"{name}: {done.stderr.strip().splitlines()[-1]}")
+            row = json.loads(done.stdout.splitlines()[-1])
+            if np.isfinite(row["value"]):
+                rows.append(row)
+    return rows
+
+
+def _main(name: str, folder: str) -> None:
+    function, unit, limit = _FIGURES[name]
+    value = function(Path(folder))
+    who = resource.RUSAGE_CHILDREN if function is _cold else resource.RUSAGE_SELF
+    peak = resource.getrusage(who).ru_maxrss * (1 if sys.platform == "darwin" else 1024) / 1e6
+    row = {"name": name, "value": value, "unit": unit, "limit": limit, "peak_mb": round(peak, 1)}
+    print(json.dumps(row))
+
+
+if __name__ == "__main__":
+    _main(*sys.argv[1:3])
