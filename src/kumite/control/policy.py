@@ -32,7 +32,7 @@ class Tracks:
 
     centre: np.ndarray  # [L's frames, 2] m, ground track of the centroid of the hitting points
     centre_start: np.ndarray  # [L + 1]
-    root: np.ndarray  # [L's frames, 2] m, ground track of the pelvis
+    root: np.ndarray  # [L's frames, 3] (x, z, yaw) of the facing frame
     tip: np.ndarray  # [effective frames, 3] m
     tip_weight: np.ndarray  # [effective frames] 0..1, speed over the fastest blow's
     tip_when: np.ndarray  # [effective frames] frames since the action began, from 1
@@ -61,7 +61,7 @@ def stretch_tracks(library: Library, limbs: tuple[str, ...] = LIMBS) -> Tracks:
     return Tracks(
         np.ascontiguousarray(centre),
         start.astype(np.int64),
-        np.ascontiguousarray(relative[:, :2]),
+        np.ascontiguousarray(relative),
         np.ascontiguousarray(tip),
         strikes.speed[:, use][frame[row], limb] / fastest,
         (since[row] + 1).astype(np.int64),

@@ -265,6 +265,7 @@ def show_one(
     anchor,
     dt,
     half_life,
+    root_half_life,
     reaction_half_life,
     longest_foot_offset,
     library_root,
@@ -289,7 +290,7 @@ def show_one(
 ):
     """One frame of character k of :func:`show`."""
     f = frame[k]
-    spring(root_offset[k], root_offset_velocity[k], half_life, dt)
+    spring(root_offset[k], root_offset_velocity[k], root_half_life, dt)
     move_feet(
         foot_offset[k], foot_velocity[k], library_contact[f], half_life, longest_foot_offset, dt
     )
@@ -336,6 +337,7 @@ def show(
     anchor,
     dt,
     half_life,
+    root_half_life,
     reaction_half_life,
     longest_foot_offset,
     library_root,
@@ -370,6 +372,7 @@ def show(
             anchor,
             dt,
             half_life,
+            root_half_life,
             reaction_half_life,
             longest_foot_offset,
             library_root,
@@ -400,6 +403,7 @@ def show_many(
     anchor,
     dt,
     half_life,
+    root_half_life,
     reaction_half_life,
     longest_foot_offset,
     library_root,
@@ -430,6 +434,7 @@ def show_many(
             anchor,
             dt,
             half_life,
+            root_half_life,
             reaction_half_life,
             longest_foot_offset,
             library_root,

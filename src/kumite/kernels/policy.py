@@ -210,6 +210,7 @@ def look_ahead(
     strike_grid,
     weight_strike,
     root,
+    weight_facing,
     worth,
     gap,
 ):
@@ -217,9 +218,10 @@ def look_ahead(
 
     target [H, 3]: where the target is expected at frames 1.. after the decision, seen from the
     avatar's facing frame; the last row holds from then on. other [H, 2]: the same for the body that
-    must not be run into. track, tip, root: what the stretches do (root [., 2] shares track_start).
-    A grid is (low, step, size, wraps, inside_only). Fills worth [n] with the weighted values and
-    gap [n] with the smallest distance kept to the other body.
+    must not be run into. track, tip, root: what the stretches do (root [., 3] is (x, z, yaw) of the
+    facing frame and shares track_start). A grid is (low, step, size, wraps, inside_only). Fills
+    worth [n] with the weighted values, with weight_facing times the mean cosine of the angle to the
+    target, and gap [n] with the smallest distance kept to the other body.
     """
     index = np.zeros(8, dtype=np.int64)
     weight = np.zeros(8)
@@ -280,8 +282,14 @@ def look_ahead(
             )
             worth[n] += weight_strike * (best + discount_strike ** duration[k] * later)
         nearest = np.inf
+        towards = 0.0
         for t in range(last - first):
             h = min(t, horizon)
+            x = target[h, 0] - root[first + t, 0]
+            z = target[h, 2] - root[first + t, 1]
+            yaw = root[first + t, 2]
+            towards += (x * np.sin(yaw) + z * np.cos(yaw)) / (np.hypot(x, z) + 1e-9)
             d = np.hypot(root[first + t, 0] - other[h, 0], root[first + t, 1] - other[h, 1])
             nearest = min(nearest, d)
+        worth[n] += weight_facing * towards / (last - first)
         gap[n] = nearest

@@ -15,6 +15,7 @@ from kumite.kernels.blow import NO_BLOW
 from kumite.rotation import conjugate, planar_compose, planar_inverse, rotate
 
 JOIN_HALF_LIFE = 0.10  # s, in which half of the difference at a join is gone
+ROOT_HALF_LIFE = 0.20  # s, the same for the root: its speed must not be felt to jump
 REACTION_HALF_LIFE = 0.16  # s, in which a struck body recovers half
 LONGEST_FOOT_OFFSET = 0.30  # m that a planted foot may stand away from where the capture has it
 BLOW_BEFORE, BLOW_AFTER = 0.07, 0.12  # s around the effective frames in which a blow may land
@@ -125,6 +126,7 @@ class Cast:
             self.anchor,
             dt,
             JOIN_HALF_LIFE,
+            ROOT_HALF_LIFE,
             REACTION_HALF_LIFE,
             LONGEST_FOOT_OFFSET,
             clips.root_position,
