@@ -142,7 +142,7 @@ def test_layout_does_not_matter(tmp_path: Path) -> None:
     variants = {
         "crlf": ARM.replace("\n", "\r\n"),
         "old mac": ARM.replace("\n", "\r"),
-        "tabs": ARM.replace("  ", "\t").replace("Frame Time: ", "Frame Time:\t"),
+        "tabs": ARM.replace(" ", "\t").replace("End\tSite", "End Site"),
         "braces on the line": ARM.replace("\n{", " {").replace("mid\n  {", "mid {"),
         "one line": " ".join(ARM.split("MOTION")[0].split()) + "\nMOTION" + ARM.split("MOTION")[1],
         "lower case": ARM.replace("OFFSET", "offset").replace("Xrotation", "XROTATION"),
@@ -253,7 +253,10 @@ BAD = {
         "joint 'base' is open.*expected '}'",
     ),
     "brace missing": (lambda s: s.replace("mid\n  {", "mid\n"), ":8: unexpected 'OFFSET 0 2 0'"),
-    "brace too many": (lambda s: s.replace("MOTION", "}\nMOTION"), "'}' without '{'"),
+    "brace too many": (
+        lambda s: s.replace("MOTION", "}\nMOTION"),
+        "unexpected '}'; expected ROOT or MOTION",
+    ),
     "second root": (lambda s: s.replace("MOTION", "ROOT b\nMOTION"), "a second ROOT"),
     "channel": (
         lambda s: s.replace("CHANNELS 1 X", "CHANNELS 1 W"),
@@ -266,6 +269,10 @@ BAD = {
     "offset of two": (lambda s: s.replace("OFFSET 1 0 0", "OFFSET 1 0"), "OFFSET with 2 numbers"),
     "offset": (lambda s: s.replace("OFFSET 1 0 0", "OFFSET 1 0 x"), ":12: 'x' is not a number"),
     "no offset": (lambda s: s.replace("OFFSET 1 0 0", ""), "joint 'hand' has no OFFSET"),
+    "brace first": (lambda s: s.replace("ROOT", "}\nROOT"), ":2: unexpected '}'; expected ROOT"),
+    "end without offset": (lambda s: s.replace("OFFSET 0 0 1", ""), "End Site has no OFFSET"),
+    "joint in an end": (lambda s: s.replace("OFFSET 0 0 1", "JOINT x"), "'JOINT' in an End Site"),
+    "end of what": (lambda s: s.replace("End Site", "End"), "'End'; expected 'End Site'"),
     "few frames": (lambda s: s.replace("Frames: 2", "Frames: 3"), "2 frames of motion; expected 3"),
     "more frames": (
         lambda s: s.replace("Frames: 2", "Frames: 1"),

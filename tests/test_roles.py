@@ -195,6 +195,11 @@ def test_a_mapping_beats_names() -> None:
         find_roles(skeleton, {"left_hand": "hand_L"})
 
 
+def test_limbs_are_in_a_row() -> None:
+    with pytest.raises(KumiteError, match=r"left_shin .'calf_l'. is not below left_thigh .'head'."):
+        find_roles(person("unreal"), {"left_thigh": "head", "head": "spine_02"})
+
+
 def test_gaps_in_limbs_are_filled() -> None:
     skeleton = person("mixamo")
     names = [n.replace("LeftLeg", "Gelenk").replace("RightForeArm", "Ecke") for n in skeleton.names]

@@ -31,7 +31,7 @@ def parse_number(data, start, end):
     mantissa, digits, kept, power = 0, 0, 0, 0
     after_dot = False
     while i < end:
-        c = data[i]
+        c = int(data[i])
         if c >= DIGIT_0 and c <= DIGIT_9:
             digits += 1
             if kept < MOST_DIGITS:
@@ -61,7 +61,7 @@ def parse_number(data, start, end):
             return 0.0, False, False
         exponent = 0
         while i < end:
-            c = data[i]
+            c = int(data[i])
             if c < DIGIT_0 or c > DIGIT_9:
                 return 0.0, False, False
             exponent = min(exponent * 10 + (c - DIGIT_0), 100000)

@@ -32,8 +32,9 @@ from kumite.mocap.raw import RawMotion
 DOFS = ("tx", "ty", "tz", "rx", "ry", "rz", "l")
 USUAL_FPS = 120.0  # of CMU's database, whose AMC files do not say
 INCH = 0.0254  # m; ASF lengths are inches once divided by the header's `length`
-_SECTIONS = tuple(
-    [":version", ":name", ":units", ":documentation", ":root", ":bonedata", ":hierarchy", ":skin"]
+_SECTIONS = (
+    *(":version", ":name", ":units", ":documentation", ":root"),
+    *(":bonedata", ":hierarchy", ":skin"),
 )
 _ROOT_KEYS = "order, axis, position or orientation"
 _BONE_KEYS = "id, name, direction, length, axis, bodymass, cofmass, dof, limits or end"
@@ -458,8 +459,8 @@ class _Amc:
             raise at(
                 self.path,
                 line,
-                f"frame {count} ends with {len(frame)} bones; expected the {len(names)} of the first "
-                f"(differs in {', '.join(odd[:4])})",
+                f"frame {count} ends with {len(frame)} bones; expected the {len(names)} of "
+                f"the first (differs in {', '.join(odd[:4])})",
             )
         rows.append([v for n in names for v in frame[n]])
         return names

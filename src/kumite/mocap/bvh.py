@@ -16,7 +16,7 @@ import numpy as np
 
 from kumite import rotation
 from kumite.clip import NO_PARENT, Skeleton
-from kumite.errors import at
+from kumite.errors import KumiteError, at
 from kumite.kernels import parse
 from kumite.mocap import text
 from kumite.mocap.raw import RawMotion
@@ -34,22 +34,28 @@ _STILL = 1e-4  # of the longest bone: a position channel that moves less than th
 class _Joint:
     name: str
     parent: int
-    line: int
+    index: int
     offset: list[float] | None = None
     channels: list[str] | None = None
     tips: list[list[float]] = field(default_factory=list)
 
 
+@dataclass
+class _EndSite:
+    joint: _Joint
+    offset: list[float] | None = None
+
+
 def read_bvh(path: Path | str) -> RawMotion:
     """One BVH file, in its own units.
 
-    Errors: everything that is not a whole, well-formed file, with line, token and what was expected.
+    Errors: anything but a whole, well-formed file, with line, token and what was expected.
     """
     path = Path(path)
     data = text.read_bytes(path)
     motion = re.search(rb"^[ \t]*MOTION[ \t]*$", data, re.MULTILINE | re.IGNORECASE)
     header = text.decode(path, data if motion is None else data[: motion.start()])
-    joints = _hierarchy(path, header, complete=motion is not None)
+    joints = _Hierarchy(path, header).read(complete=motion is not None)
     if motion is None:
         raise at(path, data.count(b"\n") + 1, "the file ends here; expected MOTION")
     frames, frame_time, start = _motion_header(path, data, motion.end())
@@ -60,118 +66,121 @@ def read_bvh(path: Path | str) -> RawMotion:
 # Hierarchy ---------------------------------------------------------------------------------------
 
 
-def _hierarchy(path: Path, header: str, *, complete: bool) -> list[_Joint]:
-    """The joints in file order, parents first. Iterative: a file may nest as deep as it likes."""
-    todo: deque[tuple[int, str]] = deque(
-        (n, part.strip())
-        for n, line in enumerate(header.split("\n"), 1)
-        for part in re.split(r"([{}])", line)
-        if part.strip()
-    )
-    joints: list[_Joint] = []
-    tips = 0
-    open_: list[tuple[int, int]] = []  # (joint, line of its brace); END_SITE inside an End Site
-    opens_next: int | None = None
-    titled = False
-    last_line = header.count("\n") + 1
-    while todo:
-        line, statement = todo.popleft()
-        word, _, rest = statement.partition(" ") if " " in statement else _split(statement)
-        rest = rest.strip()
-        key = word.upper()
-        if opens_next is not None:
-            if statement != "{":
-                raise at(path, line, f"unexpected {text.shown(statement)}; expected '{{'")
-            open_.append((opens_next, line))
-            opens_next = None
-        elif not titled:
-            if key != "HIERARCHY":
-                raise at(path, line, f"unexpected {text.shown(word)}; expected HIERARCHY")
-            titled = True
-            if rest:
-                todo.appendleft((line, rest))
-        elif statement == "}":
-            if not open_:
-                raise at(path, line, "'}' without '{'; expected MOTION")
-            joint, _ = open_.pop()
-            if joint == _END_SITE and len(joints[open_[-1][0]].tips) != tips:
-                raise at(path, line, "End Site without OFFSET")
-            if joint != _END_SITE and joints[joint].offset is None:
-                raise at(path, line, f"joint {text.shown(joints[joint].name)} has no OFFSET")
-        elif key == "ROOT":
-            if joints:
-                raise at(path, line, "a second ROOT; expected one character in a file")
-            joints.append(_Joint(_name(path, line, rest), NO_PARENT, line))
-            opens_next = 0
-        elif not open_:
-            raise at(path, line, f"unexpected {text.shown(word)}; expected ROOT or MOTION")
-        elif key in ("JOINT", "END"):
-            parent = open_[-1][0]
-            if parent == _END_SITE:
-                raise at(
-                    path, line, f"{text.shown(word)} inside an End Site; expected OFFSET or '}}'"
-                )
-            if key == "JOINT":
-                joints.append(_Joint(_name(path, line, rest), parent, line))
-                opens_next = len(joints) - 1
-            elif rest.lower().startswith("site"):
-                opens_next = _END_SITE
-                tips = len(joints[parent].tips) + 1
-            else:
-                raise at(path, line, f"{text.shown(statement)}; expected 'End Site'")
-        elif key == "OFFSET":
-            tokens = rest.split(None, 3)
-            if len(tokens) < 3:
-                raise at(path, line, f"OFFSET with {len(tokens)} numbers; expected 3")
-            offset = [text.number(path, line, t, "an OFFSET of 3 numbers") for t in tokens[:3]]
-            inside, joint = open_[-1][0], open_[-1][0]
-            if inside == _END_SITE:
-                joint = open_[-2][0]
-                if len(joints[joint].tips) == tips:
-                    raise at(path, line, "a second OFFSET; expected '}'")
-                joints[joint].tips.append(offset)
-            elif joints[joint].offset is not None:
-                raise at(path, line, "a second OFFSET; expected one a joint")
-            else:
-                joints[joint].offset = offset
-            if len(tokens) > 3:
-                todo.appendleft((line, tokens[3]))
-        elif key == "CHANNELS":
-            channels, more = _channels(path, line, rest)
-            if open_[-1][0] == _END_SITE:
-                if channels:
-                    raise at(path, line, "CHANNELS in an End Site; expected OFFSET or '}'")
-            elif joints[open_[-1][0]].channels is not None:
-                raise at(path, line, "a second CHANNELS; expected one a joint")
-            else:
-                joints[open_[-1][0]].channels = channels
+class _Hierarchy:
+    """A HIERARCHY while it is read. Iterative: a file may nest as deep as it likes."""
+
+    def __init__(self, path: Path, header: str) -> None:
+        self.path = path
+        self.last_line = header.count("\n") + 1
+        # Braces stand alone, whatever line they are on.
+        self.todo: deque[tuple[int, str]] = deque(
+            (n, part.strip())
+            for n, line in enumerate(header.split("\n"), 1)
+            for part in re.split(r"([{}])", line)
+            if part.strip()
+        )
+        self.joints: list[_Joint] = []
+        self.open: list[_Joint | _EndSite] = []  # whose braces are open, the innermost last
+        self.opens_next: _Joint | _EndSite | None = None  # its name was read, not yet its brace
+        self.titled = False
+
+    def error(self, line: int, what: str) -> KumiteError:
+        return at(self.path, line, what)
+
+    def read(self, *, complete: bool) -> list[_Joint]:
+        """The joints in file order, parents first. ``complete``: MOTION follows."""
+        while self.todo:
+            line, statement = self.todo.popleft()
+            word, *rest = statement.split(None, 1)
+            more = self.statement(line, word, statement, rest[0] if rest else "")
             if more:
-                todo.appendleft((line, more))
+                self.todo.appendleft((line, more))
+        if not self.titled:
+            raise self.error(self.last_line, "the file ends here; expected HIERARCHY")
+        if self.opens_next is not None or self.open or not self.joints:
+            inside = [o for o in self.open if isinstance(o, _Joint)]
+            where = f" (joint {text.shown(inside[-1].name)} is open)" if inside else ""
+            expected = "'{'" if self.opens_next else "'}'" if self.open else "ROOT"
+            what = "MOTION comes" if complete else "the file ends"
+            raise self.error(self.last_line, f"{what} too early{where}; expected {expected}")
+        return self.joints
+
+    def statement(self, line: int, word: str, statement: str, rest: str) -> str:
+        """Take one statement in; returns what is left of it for the next."""
+        key = word.upper()
+        if self.opens_next is not None:
+            if statement != "{":
+                raise self.error(line, f"unexpected {text.shown(statement)}; expected '{{'")
+            self.open.append(self.opens_next)
+            self.opens_next = None
+            return ""
+        if not self.titled:
+            if key != "HIERARCHY":
+                raise self.error(line, f"unexpected {text.shown(word)}; expected HIERARCHY")
+            self.titled = True
+            return rest
+        if key == "ROOT":
+            if self.joints:
+                raise self.error(line, "a second ROOT; expected one character in a file")
+            self.joint(line, rest, NO_PARENT)
+            return ""
+        if not self.open:
+            raise self.error(line, f"unexpected {text.shown(word)}; expected ROOT or MOTION")
+        inside = self.open[-1]
+        if statement == "}":
+            self.close(line)
+        elif key == "OFFSET":
+            return self.offset(line, inside, rest)
+        elif key == "CHANNELS":
+            return self.channels(line, inside, rest)
+        elif key not in ("JOINT", "END"):
+            raise self.error(line, f"unknown keyword {text.shown(word)}; expected {_KEYWORDS}")
+        elif isinstance(inside, _EndSite):
+            raise self.error(line, f"{text.shown(word)} in an End Site; expected OFFSET or '}}'")
+        elif key == "JOINT":
+            self.joint(line, rest, inside.index)
+        elif rest.lower().startswith("site"):
+            self.opens_next = _EndSite(inside)
         else:
-            raise at(path, line, f"unknown keyword {text.shown(word)}; expected {_KEYWORDS}")
-    if not titled:
-        raise at(path, last_line, "the file ends here; expected HIERARCHY")
-    if opens_next is not None or open_ or not joints:
-        inside = [j for j, _ in open_ if j != _END_SITE]
-        where = f" (joint {text.shown(joints[inside[-1]].name)} is open)" if inside else ""
-        expected = "'{'" if opens_next is not None else "'}'" if open_ else "ROOT"
-        what = "MOTION comes" if complete else "the file ends"
-        raise at(path, last_line, f"{what} too early{where}; expected {expected}")
-    return joints
+            raise self.error(line, f"{text.shown(statement)}; expected 'End Site'")
+        return ""
 
+    def joint(self, line: int, name: str, parent: int) -> None:
+        if not name:
+            raise self.error(line, "a joint without a name")
+        self.opens_next = _Joint(name, parent, len(self.joints))
+        self.joints.append(self.opens_next)
 
-_END_SITE = -2  # in the stack of open braces
+    def close(self, line: int) -> None:
+        closed = self.open.pop()
+        if closed.offset is None:
+            what = (
+                "End Site" if isinstance(closed, _EndSite) else f"joint {text.shown(closed.name)}"
+            )
+            raise self.error(line, f"{what} has no OFFSET")
+        if isinstance(closed, _EndSite):
+            closed.joint.tips.append(closed.offset)
 
+    def offset(self, line: int, inside: _Joint | _EndSite, rest: str) -> str:
+        tokens = rest.split(None, 3)
+        if len(tokens) < 3:
+            raise self.error(line, f"OFFSET with {len(tokens)} numbers; expected 3")
+        if inside.offset is not None:
+            raise self.error(line, "a second OFFSET; expected one only")
+        what = "an OFFSET of 3 numbers"
+        inside.offset = [text.number(self.path, line, t, what) for t in tokens[:3]]
+        return tokens[3] if len(tokens) > 3 else ""
 
-def _split(statement: str) -> tuple[str, str, str]:
-    word, *rest = statement.split(None, 1)
-    return word, " ", rest[0] if rest else ""
-
-
-def _name(path: Path, line: int, name: str) -> str:
-    if not name:
-        raise at(path, line, "a joint without a name")
-    return name
+    def channels(self, line: int, inside: _Joint | _EndSite, rest: str) -> str:
+        channels, more = _channels(self.path, line, rest)
+        if isinstance(inside, _EndSite):
+            if channels:
+                raise self.error(line, "CHANNELS in an End Site; expected OFFSET or '}'")
+        elif inside.channels is not None:
+            raise self.error(line, "a second CHANNELS; expected one only")
+        else:
+            inside.channels = channels
+        return more
 
 
 def _channels(path: Path, line: int, rest: str) -> tuple[list[str], str]:
@@ -191,7 +200,8 @@ def _channels(path: Path, line: int, rest: str) -> tuple[list[str], str]:
             raise at(
                 path,
                 line,
-                f"unknown channel {text.shown(word)}; expected one of {', '.join(_CHANNELS.values())}",
+                f"unknown channel {text.shown(word)}; "
+                f"expected one of {', '.join(_CHANNELS.values())}",
             )
         if channel in POSITION_CHANNELS and channel in channels:
             raise at(path, line, f"channel {channel} twice; expected it once")

@@ -143,7 +143,7 @@ def _ankles(roles: Mapping[str, int]) -> tuple[int, ...]:
 
 
 def _foot_points(skeleton: Skeleton, roles: Mapping[str, int]) -> list[tuple[int, np.ndarray]]:
-    """Points that may touch the floor: ankles, and all joints and tips below (joint, offset [3])."""
+    """What may touch the floor, (joint, offset [3]): ankles, and joints and tips below them."""
     below = set(_ankles(roles))
     for j in range(1, len(skeleton)):
         if int(skeleton.parents[j]) in below:

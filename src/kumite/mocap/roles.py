@@ -9,6 +9,7 @@ and a head by their symmetry.
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -65,7 +66,7 @@ def find_roles(skeleton: Skeleton, given: Mapping[str, str] | None = None) -> Fo
     """Every role that can be found. ``given`` maps roles to joint names and beats everything.
 
     Errors: unknown role or joint in ``given``; required roles that are not to be found, all at
-    once, with the joints that there are.
+    once, with the joints that there are; limbs whose joints are not in a row.
     """
     joints: dict[str, int] = {}
     how: dict[str, str] = {}
@@ -97,6 +98,16 @@ def find_roles(skeleton: Skeleton, given: Mapping[str, str] | None = None) -> Fo
             f"no {_listed(missing)} to be found among the joints: {shown}; expected a mapping from "
             f"role to joint name"
         )
+    for parts in (ARM_ROLES[1:], LEG_ROLES[:3]):
+        for above, below in itertools.pairwise(parts):
+            for side in SIDES:
+                a, b = joints[f"{side}_{above}"], joints[f"{side}_{below}"]
+                if a == b or a not in _ancestors(skeleton, b):
+                    raise KumiteError(
+                        f"{side}_{below} ({skeleton.names[b]!r}) is not below {side}_{above} "
+                        f"({skeleton.names[a]!r}); expected a limb's joints in a row, or a mapping "
+                        "from role to joint name"
+                    )
     return FoundRoles({r: joints[r] for r in ROLES if r in joints}, how)
 
 
