@@ -1,1 +1,1 @@
-"""Motion capture files in: BVH and ASF/AMC, single or by the folder, as clips in our conventions."""
+"""Motion capture files in: BVH and ASF/AMC, one or a folder, as clips in our conventions."""
