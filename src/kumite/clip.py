@@ -316,8 +316,8 @@ def resample(clip: Clip, fps: float) -> Clip:
         return clip
     count = int(np.floor((len(clip) - 1) * fps / clip.fps + 1e-6)) + 1
     at = np.minimum(np.arange(count) * (clip.fps / fps), len(clip) - 1)
-    i = np.minimum(at.astype(np.int64), max(len(clip) - 2, 0))
-    t = at - i
+    i = (at + 1e-9).astype(np.int64)
+    t = np.maximum(at - i, 0.0)
     k = np.minimum(i + 1, len(clip) - 1)
     root = clip.root_position[i] * (1 - t)[:, None] + clip.root_position[k] * t[:, None]
     on_frame = t < 1e-9

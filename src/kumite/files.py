@@ -17,6 +17,8 @@ from safetensors.numpy import save as save_tensors
 
 from kumite.errors import KumiteError
 
+META_KEY = "kumite"
+
 
 @contextlib.contextmanager
 def writing(path: Path | str) -> Iterator[Path]:
@@ -47,7 +49,9 @@ def save(
     path: Path | str, kind: str, version: int, header: Mapping[str, Any], arrays: dict[str, Any]
 ) -> None:
     """Write arrays and a JSON header. The same content gives the same bytes."""
-    meta = {"kumite": kind, "version": str(version), "header": json.dumps(header, sort_keys=True)}
+    # One key: safetensors writes several in an order that changes from run to run.
+    what = {"kind": kind, "version": version, "header": header}
+    meta = {META_KEY: json.dumps(what, sort_keys=True, allow_nan=False)}
     tensors = {k: np.ascontiguousarray(v) for k, v in sorted(arrays.items())}
     with writing(path) as temporary:
         temporary.write_bytes(save_tensors(tensors, metadata=meta))
@@ -65,13 +69,13 @@ def load(path: Path | str, kind: str, version: int) -> tuple[dict[str, Any], dic
         raise KumiteError(f"{path}: cannot be read ({error.strerror})") from None
     try:
         size = int.from_bytes(blob[:8], "little")
-        meta = json.loads(blob[8 : 8 + size])["__metadata__"]
-        found, number, header = meta["kumite"], meta["version"], json.loads(meta["header"])
+        meta = json.loads(json.loads(blob[8 : 8 + size])["__metadata__"][META_KEY])
+        found, number, header = meta["kind"], meta["version"], meta["header"]
     except (ValueError, KeyError, TypeError, MemoryError, OverflowError):
         raise KumiteError(f"{path}: damaged, or not a file of Kumite's; expected a {kind}") from None
     if found != kind:
         raise KumiteError(f"{path}: this is a {found}; expected a {kind}")
-    if number != str(version):
+    if number != version:
         raise KumiteError(
             f"{path}: {kind} of version {number}; this Kumite reads version {version}: build it again"
         )

@@ -73,6 +73,18 @@ class Loaded:
         """
         return concatenate(self.clips, fps)
 
+    def by_skeleton(self) -> list[list[Clip]]:
+        """The clips in groups of one skeleton each, in order."""
+        groups: list[list[Clip]] = []
+        for clip in self.clips:
+            for group in groups:
+                if group[0].skeleton.same_as(clip.skeleton):
+                    group.append(clip)
+                    break
+            else:
+                groups.append([clip])
+        return groups
+
     def report(self) -> list[str]:
         """Every fact once, with the clips that it holds for: what was inferred is never silent."""
         holders: dict[str, list[str]] = {}

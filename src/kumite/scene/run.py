@@ -18,7 +18,7 @@ def record(
     """Step a scene for a time [s] and keep every frame and event. progress is told 0..1."""
     if not (np.isfinite(seconds) and seconds > 0):
         raise KumiteError(f"seconds: {seconds}, expected more than 0")
-    frames = max(1, round(seconds * scene.fps)) + 1
+    frames = max(1, round(seconds * scene.fps))
     count, joints = len(scene.names), len(scene.skeleton)
     root = np.empty((frames, count, 3), np.float32)
     wxyz = np.empty((frames, count, joints, 4), np.float32)

@@ -1,0 +1,166 @@
+"""A headless browser on the studio: open it, know where things are in it, drag, look."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+from urllib.parse import urlparse
+
+import numpy as np
+import pytest
+from PIL import Image
+
+if TYPE_CHECKING:
+    import viser
+    from playwright.sync_api import Page
+
+CHROMIUM = Path("/usr/bin/chromium")
+SIZE = (900, 600)
+ARGUMENTS = (
+    "--no-sandbox",
+    "--disable-gpu",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-dev-shm-usage",
+)
+HARMLESS = ("GPU stall", "GL Driver Message", "Download the React DevTools", "[Performance]")
+
+
+@dataclass
+class Traffic:
+    """What a page asked for and complained about."""
+
+    hosts: set[str] = field(default_factory=set)
+    errors: list[str] = field(default_factory=list)
+    websocket_bytes: int = 0
+    websocket_frames: int = 0
+
+
+def need_chromium() -> None:
+    """Skip without a browser; in CI that is a failure."""
+    if CHROMIUM.exists():
+        return
+    if os.environ.get("CI"):
+        pytest.fail(f"{CHROMIUM} is missing: the studio cannot be tested")
+    pytest.skip(f"{CHROMIUM} is missing")
+
+
+@contextlib.contextmanager
+def open_page(url: str, size: tuple[int, int] = SIZE) -> Iterator[tuple[Page, Traffic]]:
+    """A headless page of ``size`` (width, height) px at ``url``, and what it asked for."""
+    from playwright.sync_api import sync_playwright
+
+    traffic = Traffic()
+
+    def came(payload: str | bytes) -> None:
+        traffic.websocket_frames += 1
+        traffic.websocket_bytes += len(payload)
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(
+            executable_path=str(CHROMIUM), headless=True, args=list(ARGUMENTS)
+        )
+        page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+        page.on("request", lambda r: traffic.hosts.add(urlparse(r.url).hostname or ""))
+        page.on("websocket", lambda w: traffic.hosts.add(urlparse(w.url).hostname or ""))
+        page.on("websocket", lambda w: w.on("framereceived", came))
+        page.on("pageerror", lambda e: traffic.errors.append(str(e)))
+        page.on(
+            "console",
+            lambda m: (
+                traffic.errors.append(m.text)
+                if m.type == "error" and not any(h in m.text for h in HARMLESS)
+                else None
+            ),
+        )
+        page.goto(url)
+        try:
+            yield page, traffic
+        finally:
+            browser.close()
+
+
+def wait_until(
+    page: Page, condition: Callable[[], bool], what: str, seconds: float = 30.0
+) -> None:
+    """Let the page run until ``condition`` holds; fails after ``seconds`` naming ``what``."""
+    end = time.perf_counter() + seconds
+    while not condition():
+        if time.perf_counter() > end:
+            pytest.fail(f"waited {seconds:.0f} s for: {what}")
+        page.wait_for_timeout(100)
+
+
+def picture(page: Page) -> np.ndarray:
+    """The page as it is seen now [H, W, 3] uint8."""
+    return np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB"))
+
+
+def save_picture(url: str, path: Path, size: tuple[int, int] = (1280, 800), wait: float = 6) -> None:
+    """A picture of a running studio for the documentation, ``wait`` seconds after it appears."""
+    with open_page(url, size) as (page, _):
+        page.wait_for_selector("canvas")
+        page.wait_for_timeout(wait * 1000)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        page.screenshot(path=str(path))
+
+
+def client_of(server: viser.ViserServer, page: Page) -> viser.ClientHandle:
+    """The server's side of the only open page, once its camera is known."""
+    wait_until(page, lambda: len(server.get_clients()) > 0, "the page to connect", 40)
+    return next(iter(server.get_clients().values()))
+
+
+def project(point: np.ndarray, camera: viser.CameraHandle, page: Page) -> tuple[float, float]:
+    """Where a world point [3] is on the page (x, y) px.
+
+    The camera's picture fills the canvas, which may not fill the page.
+    """
+    box = page.locator("canvas").first.bounding_box()
+    if box is None:
+        pytest.fail("the page has no canvas to be seen")
+    forward = camera.look_at - camera.position
+    forward = forward / np.linalg.norm(forward)
+    right = np.cross(forward, camera.up_direction)
+    right = right / np.linalg.norm(right)
+    up = np.cross(right, forward)
+    ray = np.asarray(point, dtype=np.float64) - camera.position
+    focal = 0.5 * box["height"] / np.tan(0.5 * camera.fov)
+    depth = float(ray @ forward)
+    return (
+        box["x"] + 0.5 * box["width"] + focal * float(ray @ right) / depth,
+        box["y"] + 0.5 * box["height"] - focal * float(ray @ up) / depth,
+    )
+
+
+def drag(page: Page, start: tuple[float, float], end: tuple[float, float], steps: int = 8) -> None:
+    """Press at ``start``, move to ``end`` and let go; px on the page."""
+    page.mouse.move(*start)
+    page.wait_for_timeout(250)  # a gizmo takes the pointer only after a frame with it on the handle
+    page.mouse.down()
+    for i in range(1, steps + 1):
+        t = i / steps
+        page.mouse.move(start[0] + t * (end[0] - start[0]), start[1] + t * (end[1] - start[1]))
+        page.wait_for_timeout(60)
+    page.mouse.up()
+
+
+def around(image: np.ndarray, centre: tuple[float, float], radius: int) -> np.ndarray:
+    """The square of pixels [h, w, 3] within ``radius`` px of a place on the page."""
+    x, y = round(centre[0]), round(centre[1])
+    height, width = image.shape[:2]
+    return image[
+        max(y - radius, 0) : min(y + radius, height), max(x - radius, 0) : min(x + radius, width)
+    ]

@@ -1,0 +1,54 @@
+"""Our files: whole or not at all, versioned, and nothing in them runs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kumite import files
+from kumite.errors import KumiteError
+
+
+def test_round_trip_and_same_bytes(tmp_path):
+    arrays = {"b": np.arange(6).reshape(2, 3), "a": np.array([1.5, 2.5])}
+    files.save(tmp_path / "x", "thing", 3, {"k": [1, "é"]}, arrays)
+    files.save(tmp_path / "y", "thing", 3, {"k": [1, "é"]}, dict(reversed(arrays.items())))
+    assert (tmp_path / "x").read_bytes() == (tmp_path / "y").read_bytes()
+    header, back = files.load(tmp_path / "x", "thing", 3)
+    assert header == {"k": [1, "é"]}
+    assert all(np.array_equal(back[k], v) and back[k].dtype == v.dtype for k, v in arrays.items())
+
+
+def test_other_kinds_versions_and_damage_are_told_apart(tmp_path):
+    path = tmp_path / "x"
+    files.save(path, "thing", 3, {}, {"a": np.zeros(50)})
+    with pytest.raises(KumiteError, match="this is a thing; expected a library"):
+        files.load(path, "library", 3)
+    with pytest.raises(KumiteError, match="version 3; this Kumite reads version 4"):
+        files.load(path, "thing", 4)
+    whole = path.read_bytes()
+    for cut in (0, 4, 20, len(whole) - 40):
+        path.write_bytes(whole[:cut])
+        with pytest.raises(KumiteError, match="damaged"):
+            files.load(path, "thing", 3)
+    path.write_bytes(b"\xff" * 200)
+    with pytest.raises(KumiteError, match="damaged"):
+        files.load(path, "thing", 3)
+    with pytest.raises(KumiteError, match="cannot be read"):
+        files.load(tmp_path / "none", "thing", 3)
+
+
+def test_a_failed_write_leaves_the_old_file_and_no_other(tmp_path):
+    path = tmp_path / "x"
+    path.write_text("old")
+    with pytest.raises(RuntimeError), files.writing(path) as temporary:
+        temporary.write_text("half")
+        raise RuntimeError
+    assert path.read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["x"]
+
+
+def test_a_folder_that_cannot_be_written_is_said(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(KumiteError, match="cannot be written"), files.writing(tmp_path / "file" / "x"):
+        pass
