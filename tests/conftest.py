@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from kumite import mocap as mocap_files
+from kumite.graph import Library, build_library, builtin_library
+
 
 @pytest.fixture(scope="session")
 def mocap() -> Path:
@@ -17,3 +20,15 @@ def mocap() -> Path:
     if os.environ.get("CI"):
         pytest.fail("KUMITE_MOCAP must name the folder of motion capture on CI")
     pytest.skip("KUMITE_MOCAP does not name a folder of motion capture")
+
+
+@pytest.fixture(scope="session")
+def library() -> Library:
+    """The built-in performer's library."""
+    return builtin_library(None)
+
+
+@pytest.fixture(scope="session")
+def boxer(mocap: Path) -> Library:
+    """The real boxer's library."""
+    return build_library(mocap_files.load(mocap / "boxer").clip_set())

@@ -19,12 +19,12 @@ class Temper:
 
     approach: float = 1.0  # weight of bringing blows' reach over the target
     strike: float = 2.5  # weight of hitting it
-    facing: float = 2.0  # weight of looking at it meanwhile
+    facing: float = 4.0  # weight of looking at it meanwhile
     few: int = 3  # how many of the best actions are drawn from
     slack: float = 0.1  # an action is among the best if worth at least (1 - slack) × the best one's
     boredom: float = 0.5  # how much an action's worth is cut down while it was used recently
     memory: int = 6  # how many actions back "recently" goes
-    personal_space: float = 0.6  # m between the bodies that an action must leave
+    personal_space: float = 0.65  # m between the bodies that an action must leave
 
     def __post_init__(self) -> None:
         if self.approach < 0 or self.strike < 0 or self.approach + self.strike == 0:

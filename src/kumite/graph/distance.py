@@ -38,7 +38,7 @@ class PoseFeatures:
 
     quaternion: np.ndarray  # [Jw, 4, P]
     weight: np.ndarray  # [Jw]
-    euclidean: np.ndarray  # [D, P]
+    euclidean: np.ndarray  # [D, P], D even
 
     def take(self, frames: np.ndarray) -> PoseFeatures:
         return PoseFeatures(
@@ -87,6 +87,8 @@ def pose_features(clips: ClipSet) -> PoseFeatures:
         HEIGHT_WEIGHT * VELOCITY_HORIZON * drift.T,
         (spin[:, used] * scale[None, :, None]).reshape(len(clips), -1).T,
     ]
+    if sum(len(p) for p in parts) % 2:  # the kernels take two at a time
+        parts.append(np.zeros((1, len(clips))))
     return PoseFeatures(
         np.ascontiguousarray(np.moveaxis(local[:, used], 0, 2), dtype=np.float32),
         weight[used].astype(np.float32),

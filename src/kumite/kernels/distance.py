@@ -47,7 +47,7 @@ def angle_squared(dot):
 def distance_block(quaternion, weight, feature, a0, a1, a2, a3, first, last, out):
     """D(a, b) for four poses a and b in first..last into ``out[0..3, first..last]``.
 
-    quaternion [J, 4, P], weight [J], feature [D, P], out [4, P], all float32.
+    quaternion [J, 4, P], weight [J], feature [D, P] (D even), out [4, P], all float32.
     """
     n = last - first
     o0, o1, o2, o3 = out[0, first:last], out[1, first:last], out[2, first:last], out[3, first:last]
