@@ -1,0 +1,195 @@
+"""Characters played from a library: joins, springs, inverse kinematics, foot lock, reactions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kumite import rotation
+from kumite.clip import SIDES, forward_kinematics
+from kumite.graph import Library
+from kumite.kernels import character as kernels
+from kumite.synthesis import Cast
+from tests import toys
+
+
+@pytest.mark.jit_off
+@settings(max_examples=40, deadline=None)
+@given(st.floats(-2, 2), st.floats(-20, 20), st.floats(0.02, 0.5), st.floats(0.001, 0.5))
+def test_springs_solve_their_equation(x, v, half_life, t):
+    """Critically damped: x'' = -2 y x' - y² x; checked against many tiny steps of it."""
+    position, velocity = np.array([x]), np.array([v])
+    kernels.spring(position, velocity, half_life, t)
+    y = 2 * np.log(2) / half_life
+    a, b = x, v
+    steps = 4000
+    dt = t / steps
+    for _ in range(steps):  # midpoint rule
+        ma, mb = a + 0.5 * dt * b, b + 0.5 * dt * (-2 * y * b - y * y * a)
+        a, b = a + dt * mb, b + dt * (-2 * y * mb - y * y * ma)
+    scale = abs(x) + abs(v) * half_life
+    assert position[0] == pytest.approx(a, abs=1e-3 * scale + 1e-9)
+    assert velocity[0] == pytest.approx(b, abs=1e-3 * scale * y + 1e-9)
+
+
+@pytest.mark.jit_off
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 100_000))
+def test_two_bone_reach(seed):
+    """The foot gets where it should, keeps its world rotation, and no bone changes its length."""
+    rng = np.random.default_rng(seed)
+    s = toys.skeleton()
+    wxyz = rotation.exp(rng.normal(0, 0.3, (len(s), 3)))
+    wxyz[s.joint("left_shin")] = rotation.from_axis_angle([1, 0, 0], rng.uniform(0.2, 2.0))
+    root = rng.normal(0, 1, 3)
+    position, world = (a[0] for a in forward_kinematics(s, root[None], wxyz[None]))
+    hip, knee, foot = (s.joint(f"left_{p}") for p in ("thigh", "shin", "foot"))
+    goal = position[hip] + rng.normal(0, 1, 3) * 0.4
+    length = np.linalg.norm(goal - position[hip])
+    kept = world[foot].copy()
+    w, p, q = wxyz.copy(), position.copy(), world.copy()
+    kernels.reach(hip, knee, foot, goal, s.parents, s.offsets, root, w, p, q)
+    again, turned = (a[0] for a in forward_kinematics(s, root[None], w[None]))
+    assert np.allclose(again, p, atol=1e-9)
+    assert rotation.angle(turned[foot], kept) < 1e-6
+    bones = np.linalg.norm(s.offsets[[knee, foot]], axis=1)
+    if abs(bones[0] - bones[1]) + 1e-3 < length < 0.998 * bones.sum():
+        assert np.allclose(again[foot], goal, atol=1e-6)
+    else:
+        assert np.dot(again[foot] - again[hip], goal - again[hip]) > 0
+    others = [j for j in range(len(s)) if j not in (knee, foot, s.joint("left_toe"))]
+    assert np.allclose(again[others], position[others], atol=1e-12)
+
+
+def _walk(library: Library, frames: int, seed: int):
+    """A cast of two that takes random actions: positions, contacts and joins by frame."""
+    cast, rng = Cast(library, 2), np.random.default_rng(seed)
+    table = library.table
+    for k in range(2):
+        cast.place(k, int(rng.integers(table.states)), np.array([k * 2.0, 0.0, k * 3.0]))
+    cast.show(0.0)
+    position, joined = [cast.position.copy()], [np.zeros(2, bool)]
+    contacts, root = [cast.contacts], [cast.root_position.copy()]
+    for _ in range(frames):
+        jump = np.zeros(2, bool)
+        for k in cast.waiting:
+            s = int(np.searchsorted(table.state_frame, cast.frame[k]))
+            a = table.actions_of(s)
+            jump[k] = cast.begin(int(k), int(table.stretch[rng.integers(a.start, a.stop)]))
+        cast.advance()
+        position.append(cast.position.copy())
+        joined.append(jump)
+        contacts.append(cast.contacts)
+        root.append(cast.root_position.copy())
+    return cast, *(np.array(x) for x in (position, contacts, root, joined))
+
+
+def test_bones_keep_their_lengths(library: Library):
+    _, position, *_ = _walk(library, 200, 1)
+    s = library.clips.skeleton
+    bones = np.linalg.norm(position[:, :, 1:] - position[:, :, s.parents[1:]], axis=-1)
+    assert np.allclose(bones, np.linalg.norm(s.offsets[1:], axis=1), atol=1e-9)
+
+
+def test_without_joins_the_capture_is_played_as_it_is(library: Library):
+    cast = Cast(library, 1)
+    table, clips = library.table, library.clips
+    state = next(
+        s
+        for s in range(table.states)
+        if np.any(table.first[table.stretch[table.actions_of(s)]] == table.state_frame[s] + 1)
+    )
+    f = int(table.state_frame[state])
+    k = int(np.flatnonzero(table.first == f + 1)[0])
+    cast.place(0, state, clips.facing[f])
+    assert cast.begin(0, k) is False
+    position, _ = clips.world
+    while cast.frame[0] < cast.stop[0]:
+        cast.advance()
+        assert np.allclose(cast.position[0], position[cast.frame[0]], atol=2e-3)
+
+
+def test_joins_do_not_jump(library: Library):
+    """Poses, and the speed of every joint, change at a join as they do elsewhere."""
+    _, position, _, _, joined = _walk(library, 2000, 2)
+    fps = library.clips.fps
+    velocity = np.diff(position, axis=0) * fps
+    change = np.linalg.norm(np.diff(velocity, axis=0), axis=-1).max(axis=-1)  # [F - 2, K]
+    at_join = joined[1:-1]
+    source, _ = library.clips.world
+    same = np.diff(library.clips.clip_of_frame) == 0
+    natural = np.linalg.norm(np.diff(np.diff(source, axis=0) * fps, axis=0), axis=-1).max(axis=-1)
+    natural = natural[same[1:] & same[:-1]]
+    assert at_join.sum() > 20
+    assert np.median(change[at_join]) < np.quantile(natural, 0.95)
+    assert change[at_join].max() < 1.5 * natural.max()
+
+
+def test_planted_feet_hold(library: Library):
+    _, position, contacts, *_ = _walk(library, 2000, 3)
+    s = library.clips.skeleton
+    fps = library.clips.fps
+    source, _ = library.clips.world
+
+    def skate(p, planted):
+        out = []
+        for i, side in enumerate(SIDES):
+            v = np.linalg.norm(np.diff(p[:, s.joint(f"{side}_foot")][:, [0, 2]], axis=0), axis=1)
+            out.append(v[planted[1:, i] & planted[:-1, i]] * fps)
+        return np.concatenate(out).mean()
+
+    ground = library.contacts.on_ground.copy()
+    ground[library.clips.clip_start[:-1]] = False
+    yardstick = skate(source, ground)
+    for k in range(2):
+        assert skate(position[:, k], contacts[:, k]) < 1.5 * yardstick + 0.01
+
+
+def test_shifting_a_body_leaves_its_planted_feet(library: Library):
+    cast = Cast(library, 1)
+    states = library.table.state_frame
+    both = int(np.flatnonzero(library.contacts.on_ground[states].all(axis=1))[0])
+    cast.place(0, both, np.zeros(3))
+    cast.show(0.0)
+    s = library.clips.skeleton
+    feet = [s.joint("left_foot"), s.joint("right_foot")]
+    before, root = cast.position[0, feet].copy(), cast.root_position[0].copy()
+    cast.shift(0, 0.02, -0.01)
+    cast.show(0.0)
+    assert np.allclose(cast.root_position[0] - root, [0.02, 0, -0.01], atol=1e-9)
+    assert np.allclose(cast.position[0, feet], before, atol=2e-3)
+
+
+def test_a_struck_head_gives_way_along_the_blow_and_recovers(library: Library):
+    cast = Cast(library, 1)
+    cast.place(0, 0, np.zeros(3))
+    cast.show(0.0)
+    s = library.clips.skeleton
+    head = s.joint("head")
+    rest = cast.position[0].copy()
+    blow = np.array([0.08, 0.0, 0.0])
+    cast.strike(0, head, rest[head] + [0, 0.08, 0], blow)
+    moved = []
+    for _ in range(90):
+        cast.show(1 / 60)
+        moved.append(cast.position[0, head] - rest[head])
+    moved = np.array(moved)
+    assert 0.02 < moved[:, 0].max() < 0.12
+    assert abs(moved[:, [1, 2]]).max() < 0.5 * moved[:, 0].max()
+    assert np.linalg.norm(moved[-1]) < 2e-3
+    feet = [s.joint("left_foot"), s.joint("right_foot")]
+    assert np.allclose(cast.position[0, feet], rest[feet], atol=2e-3)
+
+
+def test_many_characters_are_what_few_are(library: Library):
+    """The kernel that runs on all cores gives the bytes of the one that does not."""
+    few, many = Cast(library, 1), Cast(library, kernels.MANY + 3)
+    for cast in (few, many):
+        for k in range(cast.count):
+            cast.place(k, 1, np.array([0.3, 0.1, 0.7]))
+            cast.begin(k, int(library.table.stretch[library.table.actions_of(1)][0]))
+        cast.advance()
+    assert np.array_equal(many.wxyz, np.broadcast_to(few.wxyz, many.wxyz.shape))
+    assert np.array_equal(many.position, np.broadcast_to(few.position, many.position.shape))

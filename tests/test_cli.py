@@ -1,0 +1,246 @@
+"""The command line, as a user meets it: what it prints, what it writes, how it fails."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kumite import cli
+from kumite.clip import forward_kinematics
+from kumite.export.bvh import write_bvh
+from kumite.graph import Library, save_library
+from kumite.mocap import load
+from tests import toys
+
+
+@pytest.fixture(scope="module")
+def built(library: Library, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A library file, in a folder of its own."""
+    path = tmp_path_factory.mktemp("built") / "built.kumite"
+    save_library(path, library)
+    return path
+
+
+@pytest.fixture
+def kumite(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    """Run a command line in a folder of its own: (status, stdout, stderr)."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+    def run(*args: str | Path) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["kumite", *map(str, args)])
+        status = 0
+        try:
+            cli.main()
+        except SystemExit as end:
+            status = int(end.code or 0)
+        captured = capsys.readouterr()
+        return status, captured.out, captured.err
+
+    return run
+
+
+def test_from_mocap_files_to_a_fight(kumite, library: Library, tmp_path: Path):
+    """info → build → run → metrics → export, on BVH files."""
+    for clip in library.clips:
+        write_bvh(tmp_path / "mocap" / f"{clip.name}.bvh", clip)
+    status, text, _ = kumite("info", "mocap", "--json", "--plot", "hits.png")
+    assert status == 0 and (tmp_path / "hits.png").stat().st_size > 10_000
+    info = json.loads(text)
+    assert {c["name"] for c in info["clips"]} == set(library.clips.names)
+    assert info["metres_per_unit"] == 0.01 and info["roles"]["left_hand"]
+    first = info["clips"][0]
+    assert set(first["hits"]) == {"left_hand", "right_hand", "left_foot", "right_foot"}
+    assert first["seconds"] == pytest.approx(first["frames"] / first["fps"], abs=1e-3)
+    assert sum(sum(c["hits"].values()) for c in info["clips"]) == len(library.strikes)
+
+    status, text, _ = kumite("build", "mocap", "-o", "my.kumite")
+    assert status == 0 and "actions" in text and "states" in text
+    outs = ["--out", "fight.rec", "--out", "fight.glb"]
+    status, text, _ = kumite(
+        "run", "sparring", "--library", "my.kumite", "--seconds", "4", "--seed", "1", *outs
+    )
+    assert status == 0 and "wrote fight.glb" in text
+    assert (tmp_path / "fight.glb").read_bytes()[:4] == b"glTF"
+    assert list((tmp_path / "my.kumite.cache").glob("*.policy"))
+
+    status, text, _ = kumite("metrics", "fight.rec", "--json")
+    m = json.loads(text)
+    assert status == 0 and m["seconds"] == pytest.approx(4.0)
+    assert m["min_separation_m"] > 0
+    keys = {"name", "thrown", "landed", "skate_m_s", "skate_ratio", "facing_share", "join_jump_m_s"}
+    assert all(keys <= set(c) for c in m["characters"])
+
+    status, _, _ = kumite("export", "fight.rec", "-o", "red.bvh", "--character", "red")
+    assert status == 0
+    back = load(tmp_path / "red.bvh").clips[0]
+    from kumite.scene import load_recording
+
+    red = load_recording(tmp_path / "fight.rec").clip("red")
+    a, _ = forward_kinematics(red.skeleton, red.root_position, red.wxyz)
+    b, _ = forward_kinematics(back.skeleton, back.root_position, back.wxyz)
+    assert np.abs(a - b).max() < 1e-3
+
+
+def test_the_built_in_performer_needs_no_files(kumite, tmp_path: Path):
+    status, text, err = kumite("run", "sparring", "--seconds", "3", "--json")
+    assert status == 0, err
+    assert [c["name"] for c in json.loads(text)["characters"]] == ["red", "blue"]
+    assert list((tmp_path / "cache" / "kumite").glob("performer-*.kumite"))
+
+
+def test_runs_with_one_seed_are_the_same_bytes(kumite, built: Path, tmp_path: Path):
+    for name in ("a", "b"):
+        status, *_ = kumite(
+            "run", "sparring", "-l", built, "--seconds", "2", "--seed", "5", "-o", f"{name}.rec",
+            "-o", f"{name}.glb",
+        )  # fmt: skip
+        assert status == 0
+    for ending in ("rec", "glb"):
+        a, b = ((tmp_path / f"{n}.{ending}").read_bytes() for n in "ab")
+        assert a == b, ending
+
+
+@pytest.mark.slow
+def test_the_number_of_threads_does_not_change_the_bytes(built: Path, tmp_path: Path):
+    written = []
+    for threads in ("1", "2"):
+        path = tmp_path / f"{threads}.rec"
+        command = [sys.executable, "-m", "kumite", "run", "sparring", "-l", str(built)]
+        fresh = tmp_path / f"{threads}.kumite"  # a library of its own: policies are trained anew
+        fresh.write_bytes(built.read_bytes())
+        command[-1] = str(fresh)
+        subprocess.run(
+            [*command, "--seconds", "3", "-o", str(path)],
+            env={**os.environ, "NUMBA_NUM_THREADS": threads},
+            check=True,
+            capture_output=True,
+        )
+        written.append(path.read_bytes())
+    assert written[0] == written[1]
+
+
+def test_scenes_are_listed(kumite):
+    status, text, _ = kumite("scenes")
+    assert status == 0 and "sparring" in text and "target" in text
+    status, text, _ = kumite("scenes", "--json")
+    assert {"sparring", "target"} <= set(json.loads(text))
+
+
+
+HEADER = """HIERARCHY
+ROOT hips
+{
+  OFFSET 0 0 0
+  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+  End Site
+  {
+    OFFSET 0 1 0
+  }
+}
+MOTION
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "expected"),
+    [
+        ("empty.bvh", "", "empty.bvh"),
+        ("cut.bvh", HEADER[:60], "cut.bvh"),
+        ("letters.bvh", HEADER + "Frames: 1\nFrame Time: 0.03\n0 0 0 0 x 0\n", "letters.bvh:14"),
+        ("nan.bvh", HEADER + "Frames: 1\nFrame Time: 0.03\n0 0 0 0 nan 0\n", "nan.bvh:14"),
+        ("count.bvh", HEADER + "Frames: 1\nFrame Time: 0.03\n0 0 0 0 0\n", "count.bvh:14"),
+        ("few.bvh", HEADER + "Frames: 3\nFrame Time: 0.03\n0 0 0 0 0 0\n", "few.bvh"),
+        ("time.bvh", HEADER + "Frames: 1\nFrame Time: 0\n0 0 0 0 0 0\n", "time.bvh:13"),
+        ("limbs.bvh", HEADER + "Frames: 1\nFrame Time: 0.03\n0 0 0 0 0 0\n", "hand"),
+        ("alone.amc", ":DEGREES\n1\nroot 0 0 0 0 0 0\n", "alone.amc"),
+    ],
+)
+@pytest.mark.parametrize("command", ["info", "build"])
+def test_bad_mocap_gets_one_clear_error(kumite, tmp_path, name, content, expected, command):
+    (tmp_path / name).write_text(content)
+    extra = ["-o", "out.kumite"] if command == "build" else []
+    status, _, err = kumite(command, name, *extra)
+    assert status == 2 and expected in err and "Traceback" not in err
+    assert not list(tmp_path.glob("*.kumite")) and not list(tmp_path.glob(".*"))
+
+
+def test_two_skeletons_in_one_library(kumite, tmp_path):
+    from kumite.clip import Clip, Skeleton
+
+    short = toys.still(40, name="short")
+    s = short.skeleton
+    tall = Skeleton(s.names, s.parents, s.offsets * 1.1, s.roles, s.tip_parents, s.tip_offsets)
+    write_bvh(tmp_path / "short.bvh", short)
+    write_bvh(tmp_path / "tall.bvh", Clip("tall", tall, 30, short.root_position * 1.1, short.wxyz))
+    status, _, err = kumite("build", ".", "-o", "out.kumite")
+    assert status == 2 and "two skeletons" in err
+    status, text, _ = kumite("info", ".", "--json")
+    assert status == 0 and len(json.loads(text)["clips"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("args", "expected"),
+    [
+        (["info", "nowhere"], "nowhere"),
+        (["build", "still.bvh", "-o", "x.kumite"], "too few frames for a graph"),
+        (["build", "still.bvh", "-o", "x.kumite", "--event", "hop"], "unknown event 'hop'"),
+        (["build", "still.bvh", "-o", "x.kumite", "--per-second", "0"], "per_second"),
+        (["build", "still.bvh", "-o", "x.kumite", "--role", "hand"], "ROLE=JOINT"),
+        (["run", "spaning"], "did you mean sparring"),
+        (["run", "sparring", "-l", "none.kumite"], "none.kumite: cannot be read"),
+        (["run", "sparring", "-l", "still.bvh"], "not a file of Kumite's"),
+        (["run", "sparring", "-l", "BUILT", "--seconds", "0"], "seconds"),
+        (["run", "sparring", "-l", "BUILT", "-o", "x.mov"], "ending of x.mov"),
+        (["run", "sparring", "-l", "BUILT", "--seconds", "1", "-o", "x.bvh"], "--character"),
+        (["run", "sparring", "-l", "BUILT", "--seconds", "1", "-o", "still.bvh/x.rec"], "written"),
+        (["metrics", "none.rec"], "none.rec: cannot be read"),
+        (["metrics", "BUILT"], "this is a library; expected a recording"),
+        (["studio", "spar"], "unknown scene 'spar'"),
+        (["studio", "none.rec"], "none.rec: cannot be read"),
+        (["bench", "--only", "nothing like it"], "no figure"),
+        (["info", "still.bvh", "--plot", "x.png"], "no effective hits"),
+    ],
+)
+def test_bad_input_ends_with_status_2_and_leaves_nothing(kumite, built, tmp_path, args, expected):
+    write_bvh(tmp_path / "still.bvh", toys.still(40))
+    status, _, err = kumite(*[str(built) if a == "BUILT" else a for a in args])
+    assert status == 2 and expected in err and "Traceback" not in err
+    left = {p.name for p in tmp_path.iterdir()} - {"still.bvh", "cache"}
+    assert not left
+
+
+def test_a_damaged_or_other_version_of_a_library(kumite, built: Path, tmp_path: Path):
+    whole = built.read_bytes()
+    (tmp_path / "cut.kumite").write_bytes(whole[: len(whole) // 2])
+    status, _, err = kumite("run", "sparring", "-l", "cut.kumite")
+    assert status == 2 and "cut.kumite: damaged" in err
+    (tmp_path / "new.kumite").write_bytes(whole.replace(b'\\"version\\": 1', b'\\"version\\": 9', 1))
+    status, _, err = kumite("run", "sparring", "-l", "new.kumite")
+    assert status == 2 and "version 9" in err
+
+
+def test_the_studio_ends_by_itself(kumite, built: Path, monkeypatch):
+    monkeypatch.setenv("DEMO_SECONDS", "2")
+    status, text, _ = kumite("studio", "sparring", "-l", built, "--port", "0", "--no-browser")
+    assert status == 0 and "http://127.0.0.1:" in text
+    monkeypatch.setenv("DEMO_SECONDS", "soon")
+    status, _, err = kumite("studio", "sparring", "-l", built)
+    assert status == 2 and "DEMO_SECONDS" in err
+
+
+@pytest.mark.slow
+def test_bench_prints_its_rows(kumite, library: Library, tmp_path):
+    for clip in library.clips:
+        write_bvh(tmp_path / "mocap" / f"{clip.name}.bvh", clip)
+    status, text, err = kumite("bench", "mocap", "--only", "approach", "--json")
+    assert status == 0, err
+    (row,) = json.loads(text)
+    assert set(row) >= {"name", "value", "unit", "limit", "peak_mb"}
+    assert row["value"] > 0 and row["peak_mb"] > 50

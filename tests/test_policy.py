@@ -1,0 +1,254 @@
+"""Value iteration against closed forms, a slow twin and the definition of its residual."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kumite.annotate import Contacts, Strikes
+from kumite.control import Behaviour, Fighter, Skill, TargetGrid, Temper, approach, approach_grid
+from kumite.control import solve, stretch_tracks, strike, strike_grid, trained
+from kumite.control.policy import frame_discount, stretch_rewards
+from kumite.errors import KumiteError
+from kumite.graph import ActionTable, Library
+from kumite.kernels import policy as kernels
+from tests import reference, toys
+
+FPS = 30.0
+
+
+def toy_library(table: ActionTable, frames: int, tips: dict[int, tuple] | None = None) -> Library:
+    """A library whose body stands still; ``tips``: frame -> (place [3], speed) of left-hand hits."""
+    clips = toys.clip_set([frames])
+    effective = np.zeros((frames, 4), bool)
+    tip, speed = np.zeros((frames, 4, 3)), np.zeros((frames, 4))
+    for f, (place, v) in (tips or {}).items():
+        effective[f, 0], tip[f, 0], speed[f, 0] = True, place, v
+    empty = np.zeros(0, np.int32)
+    strikes = Strikes(effective, tip, speed, empty, empty, empty, empty, np.zeros((0, 3)))
+    return Library(clips, Contacts(np.ones((frames, 2), bool), np.zeros((2, 2))), strikes, table)
+
+
+def two_states(displacement=((0, 0, 0), (0, 0, 0))) -> ActionTable:
+    """State 0 at frame 3 and state 1 at frame 8 take turns: 5 frames there, 3 frames back."""
+    return ActionTable(
+        np.array([3, 8]),
+        np.array([0, 1, 2]),
+        np.array([1, 0], np.int32),
+        np.zeros(2, np.float32),
+        np.array([1, 4]),
+        np.array([3, 8]),
+        np.array([0, 1]),
+        np.array(displacement, dtype=float),
+    )
+
+
+@pytest.mark.jit_off
+def test_two_states_in_closed_form():
+    """A hit in the first action, none in the second: V0 = r + γ^5 V1, V1 = γ^3 V0."""
+    place = (0.1, 1.5, 0.6)
+    library = toy_library(two_states(), 10, {5: (place, 4.0)})
+    grid = TargetGrid((-0.5, 0.3, 1.2), (0.5, 0.9, 1.8), (3, 3, 3), wraps=False, inside_only=True)
+    behaviour = Behaviour("strike", grid, tolerance=0.2)
+    solved = solve(library, behaviour, residual=1e-7)
+    g = frame_discount(behaviour, FPS)
+    near = np.linalg.norm(grid.points - place, axis=1) <= 0.2
+    assert 0 < near.sum() < len(near)
+    r = np.where(near, g**2, 0.0)  # frame 5 is the second of the action from frame 4
+    v0 = r / (1 - g**8)
+    assert solved.converged and solved.residual <= 1e-7
+    assert np.allclose(solved.value[0], v0, rtol=1e-5)
+    assert np.allclose(solved.value[1], g**3 * v0, rtol=1e-5)
+
+
+def test_the_discount_means_the_same_at_any_rate():
+    behaviour = approach()
+    assert frame_discount(behaviour, 15.0) == pytest.approx(0.97)
+    assert frame_discount(behaviour, 60.0) ** 4 == pytest.approx(0.97)
+
+
+@pytest.mark.jit_off
+def test_sweeps_equal_the_twin(library: Library):
+    """A few states of the performer's graph, both behaviours, point by point and action by action."""
+    small = _few_states(library)
+    behaviours = (
+        replace(approach(), grid=approach_grid(2.0, 3, 5)),
+        replace(strike(library, tolerance=0.6), grid=strike_grid(library.strikes.points, 4, 3, 2)),
+    )
+    for behaviour in behaviours:
+        solved = solve(small, behaviour, residual=0.0, most_sweeps=3)
+        reward = stretch_rewards(behaviour, stretch_tracks(small), small.clips.fps)
+        discount = frame_discount(behaviour, small.clips.fps)
+        expected = reference.value_iteration(small.table, reward, discount, behaviour.grid, 3)
+        assert not solved.converged and solved.sweeps == 3
+        assert solved.value.max() > 0
+        assert np.allclose(solved.value, expected, rtol=1e-4, atol=1e-5)
+
+
+def _few_states(library: Library, count: int = 6) -> Library:
+    """The first stretches of a library as a table of its own, each state with all of them."""
+    t = library.table
+    hits = library.strikes.effective.any(axis=1)
+    busy = [k for k in range(len(t.first)) if hits[t.first[k] : t.last[k] + 1].any()]
+    pick = np.array((busy[: count // 2] + [k for k in range(len(t.first)) if k not in busy])[:count])
+    every = np.arange(count, dtype=np.int32)
+    table = ActionTable(
+        t.last[pick],
+        np.arange(0, count * count + 1, count),
+        np.tile(every, count),
+        np.zeros(count * count, np.float32),
+        t.first[pick],
+        t.last[pick],
+        every,
+        t.displacement[pick],
+    )
+    return replace(library, table=table)
+
+
+def test_values_satisfy_equation_4_within_the_residual(library: Library):
+    for behaviour in (approach(), strike(library)):
+        solved = solve(library, behaviour, residual=1e-5)
+        once_more = solve(library, behaviour, residual=0.0, most_sweeps=solved.sweeps + 1)
+        gap = np.abs(once_more.value - solved.value).max() / solved.value.max()
+        assert solved.converged and gap <= 1e-5
+
+
+points = st.tuples(st.floats(-2.5, 2.5), st.floats(0.5, 2.2), st.floats(-2.5, 2.5))
+
+
+@pytest.mark.jit_off
+@settings(max_examples=60, deadline=None)
+@given(points, st.integers(0, 1000))
+def test_interpolation_equals_the_twin(point, seed):
+    rng = np.random.default_rng(seed)
+    for grid in (
+        approach_grid(),
+        TargetGrid((-1.1, 0.3, 1.2), (1.3, 1.3, 1.6), (10, 10, 4), wraps=False, inside_only=True),
+    ):
+        value = rng.normal(0, 1, len(grid)).astype(np.float32)
+        got = kernels.interpolate(
+            value, *point, *grid.kernel_arguments(), np.zeros(8, np.int64), np.zeros(8)
+        )
+        assert got == pytest.approx(reference.polar_value(value, grid, point), abs=1e-4)
+
+
+def test_interpolation_is_exact_on_grid_points():
+    for grid in (approach_grid(), strike_grid(np.array([[-0.5, 1.2, 0.5], [0.6, 1.7, 1.0]]))):
+        value = np.arange(len(grid), dtype=np.float32)
+        for m, p in enumerate(grid.points):
+            if np.hypot(p[0], p[2]) < 1e-9:
+                continue  # all angles meet at the centre
+            got = kernels.interpolate(
+                value, *p, *grid.kernel_arguments(), np.zeros(8, np.int64), np.zeros(8)
+            )
+            assert got == pytest.approx(m, abs=2e-3)
+
+
+def test_rewards_in_closed_form():
+    """Equations 5 and 6 with one frame and one hit."""
+    track = np.array([[0.0, 0.5], [0.0, 0.7]])
+    got = kernels.approach_reward(track, 0.9, 0.1, 0.0, 0.7)
+    assert got == pytest.approx(max(0.9 * np.exp(-2.0), 0.81))
+    tip, weight, when = np.array([[0.0, 1.5, 0.7]]), np.array([0.5]), np.array([3])
+    assert kernels.strike_reward(tip, weight, when, 0.9, 0.1, 0.0, 1.5, 0.79) == pytest.approx(
+        0.5 * 0.9**3
+    )
+    assert kernels.strike_reward(tip, weight, when, 0.9, 0.1, 0.0, 1.5, 0.81) == 0.0
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10_000))
+def test_the_approach_reward_stops_early_only_when_nothing_better_can_come(seed):
+    rng = np.random.default_rng(seed)
+    track = rng.normal(0, 1, (20, 2))
+    x, z = rng.normal(0, 1, 2)
+    all_frames = [
+        0.95 ** (t + 1) * np.exp(-np.hypot(p[0] - x, p[1] - z) / 0.3) for t, p in enumerate(track)
+    ]
+    assert kernels.approach_reward(track, 0.95, 0.3, x, z) == pytest.approx(max(all_frames))
+
+
+def test_tracks_are_seen_from_where_an_action_begins(library: Library):
+    tracks, table = stretch_tracks(library), library.table
+    assert len(tracks.centre) == len(tracks.root) == table.duration.sum()
+    ends = tracks.root[tracks.centre_start[1:] - 1]
+    assert np.allclose(ends[:, :2], table.displacement[:, :2])
+    assert 0 < tracks.tip_weight.max() <= 1.0
+    k = int(np.argmax(np.diff(tracks.tip_start)))
+    when = tracks.tip_when[tracks.tip_start[k] : tracks.tip_start[k + 1]]
+    assert when.min() >= 1 and when.max() <= table.duration[k]
+
+
+def test_look_ahead_agrees_with_the_table_for_a_standing_target(library: Library):
+    """The best action's worth at a grid point is its V: one more backup changes nothing."""
+    near, hit = (solve(library, b, residual=1e-6) for b in (approach(), strike(library)))
+    skill = Skill(library, near, hit, stretch_tracks(library))
+    for policy, weights in ((near, (1.0, 0.0)), (hit, (0.0, 1.0))):
+        grid = policy.behaviour.grid
+        temper = Temper(*weights, facing=0.0, few=1, slack=0.0, boredom=0.0, personal_space=0.0)
+        for m in range(1, len(grid), 7):
+            fighter = Fighter(skill, temper, np.random.default_rng(0))
+            far = np.full((1, 2), 1e6)
+            for state in (0, library.table.states // 2):
+                choice = fighter.choose(state, grid.points[m][None], far)
+                # Points on the rim may leave the grid by rounding and then count as 0.
+                if policy.value[state, m] > 1e-3:
+                    assert choice.worth == pytest.approx(policy.value[state, m], rel=2e-3)
+
+
+def test_fighters_keep_their_space_and_do_not_repeat_themselves(library: Library):
+    skill = Skill(
+        library, solve(library, approach()), solve(library, strike(library)), stretch_tracks(library)
+    )
+    target = np.array([[0.0, 1.5, 0.7]])
+    state = int(np.argmax(np.diff(library.table.action_start)))
+    bold = Fighter(skill, Temper(personal_space=0.0, few=1, boredom=0.0), np.random.default_rng(0))
+    picks = {bold.choose(state, target, target[:, [0, 2]]).stretch for _ in range(6)}
+    assert len(picks) == 1
+    bored = Fighter(skill, Temper(personal_space=0.0, few=1, boredom=0.9), np.random.default_rng(0))
+    assert len({bored.choose(state, target, target[:, [0, 2]]).stretch for _ in range(4)}) > 1
+    shy = Fighter(skill, Temper(personal_space=0.6), np.random.default_rng(0))
+    tracks = skill.tracks
+    for _ in range(10):
+        choice = shy.choose(state, target, target[:, [0, 2]])
+        a, b = tracks.centre_start[choice.stretch : choice.stretch + 2]
+        gap = np.hypot(*(tracks.root[a:b, :2] - [0.0, 0.7]).T).min()
+        assert gap >= 0.6 or choice.apart == 0
+
+
+def test_policies_are_found_again_by_content(library: Library, tmp_path):
+    first = trained(library, approach(), tmp_path)
+    again = trained(library, approach(), tmp_path, progress=lambda *_: pytest.fail("trained twice"))
+    assert np.array_equal(first.value, again.value) and again.sweeps == first.sweeps
+    other = trained(library, approach(sigma=0.2), tmp_path)
+    assert not np.array_equal(first.value, other.value)
+    assert len(list(tmp_path.glob("*.policy"))) == 2
+    for file in tmp_path.glob("*.policy"):
+        file.write_bytes(b"damaged")
+    assert np.array_equal(trained(library, approach(), tmp_path).value, first.value)
+
+
+def test_a_cache_that_cannot_be_written_is_no_error(library: Library, tmp_path):
+    (tmp_path / "file").write_text("")
+    assert trained(library, approach(), tmp_path / "file" / "cache").converged
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"discount_per_second": 1.0}, {"sigma": 0.0}, {"tolerance": -1.0}]
+)
+def test_settings_that_make_no_sense_are_refused(wrong):
+    with pytest.raises(KumiteError):
+        approach(**wrong)
+
+
+def test_grids_and_tempers_that_make_no_sense_are_refused():
+    with pytest.raises(KumiteError, match="no effective hits"):
+        strike_grid(np.zeros((0, 3)))
+    with pytest.raises(KumiteError, match="size"):
+        TargetGrid((0, 0, 0), (1, 1, 1), (1, 5, 1), wraps=False, inside_only=True)
+    with pytest.raises(KumiteError, match="weights"):
+        Temper(approach=0.0, strike=0.0)

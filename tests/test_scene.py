@@ -1,0 +1,344 @@
+"""Scenes: files, sparring, the target, blows, recordings, metrics."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kumite.clip import tip_positions
+from kumite.errors import KumiteError
+from kumite.graph import Library
+from kumite.kernels import blow as kernels
+from kumite.rotation import from_yaw
+from kumite.scene import (
+    Event,
+    LiveScene,
+    Playback,
+    Recording,
+    builtin_scenes,
+    load_recording,
+    load_scene,
+    measure,
+    record,
+    save_recording,
+)
+from kumite.scene.metrics import foot_skate, source_skate
+from tests import reference, toys
+
+
+@pytest.fixture(scope="module")
+def sparring(library: Library) -> LiveScene:
+    return LiveScene(load_scene("sparring"), library, seed=1)
+
+
+@pytest.fixture(scope="module")
+def fight(sparring: LiveScene) -> Recording:
+    sparring.reset(1)
+    return record(sparring, 30.0)
+
+
+# Blows -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.jit_off
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 100_000))
+def test_swept_contact_equals_brute_force(seed):
+    rng = np.random.default_rng(seed)
+    p0, p1, a0, a1, b0, b1 = rng.normal(0, 0.6, (6, 3))
+    ra, rb, r = rng.uniform(0.05, 0.2, 3)
+    expected = reference.first_touch(p0, p1, a0, a1, b0, b1, ra, rb, r)
+    t = kernels.swept_contact(p0, p1, a0, a1, b0, b1, ra, rb, r)
+    if expected is None:
+        assert t == -1.0
+    elif t < 0:  # grazing: never deeper than the step allows
+        steps = np.linspace(0, 1, 2001)[:, None]
+        p, a, b = (u + steps * (v - u) for u, v in ((p0, p1), (a0, a1), (b0, b1)))
+        gaps = [kernels.capsule_gap(*x, ra, rb) - r for x in zip(p, a, b)]
+        assert min(gaps) > -0.05 * (min(ra, rb) + r)
+    else:
+        travel = np.linalg.norm(p1 - p0) + max(np.linalg.norm(a1 - a0), np.linalg.norm(b1 - b0))
+        assert 0 <= (t - expected) * travel <= 0.3 * (min(ra, rb) + r) + 1e-6
+
+
+@pytest.mark.parametrize("speed", [1.0, 5.0, 20.0, 100.0, 1000.0])
+def test_no_fist_skips_through_a_head_at_any_speed(speed):
+    """Straight at the centre, at 30 frames a second: from one side to the other in one frame."""
+    step = speed / 30
+    p0, p1 = np.array([-step / 2, 0, 0]), np.array([step / 2, 0, 0])
+    zero = np.zeros(3)
+    t = kernels.swept_contact(p0, p1, zero, zero, zero, zero, 0.1, 0.1, 0.05)
+    assert t >= 0
+    if step / 2 > 0.15:
+        assert (t - 0.5) * step == pytest.approx(-0.15, abs=0.05)
+
+
+# Scene files -------------------------------------------------------------------------------------
+
+
+def test_builtin_scenes_are_found_and_near_names_suggested():
+    assert set(builtin_scenes()) >= {"sparring", "target"}
+    with pytest.raises(KumiteError, match=r"unknown scene 'sparing': did you mean sparring"):
+        load_scene("sparing")
+
+
+GOOD = """
+title = "Mine"
+[[character]]
+name = "a"
+position = [0, 0]
+aims_at = "b"
+[[character]]
+name = "b"
+position = [0, 1]
+yaw_deg = 180
+aims_at = "a"
+"""
+
+
+def test_a_scene_file_is_read(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(GOOD)
+    scene = load_scene(str(path))
+    assert scene.title == "Mine" and scene.character[1].yaw_deg == 180
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (GOOD.replace("position = [0, 1]", "position = [0]"), r"character.1.position"),
+        (GOOD.replace('aims_at = "b"', 'aims_at = "c"'), r"a aims at 'c'; expected another name"),
+        (GOOD.replace('name = "b"', 'name = "a"'), "twice: a"),
+        (GOOD + "approach = 0\nstrike = 0\n", "at least one weight above 0"),
+        (GOOD + "strike = nan\n", "character.1.strike"),
+        (GOOD + "weight = 1\n", "character.1.weight: Extra"),
+        ("title = ", "not TOML"),
+        ('title = "x"', "character: Field required"),
+    ],
+)
+def test_wrong_scene_files_name_the_key(tmp_path, text, message):
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    with pytest.raises(KumiteError, match=message) as error:
+        load_scene(str(path))
+    assert "mine.toml" in str(error.value)
+
+
+def test_a_scene_file_that_is_missing_or_no_text(tmp_path):
+    with pytest.raises(KumiteError, match="cannot be read"):
+        load_scene(str(tmp_path / "none.toml"))
+    (tmp_path / "bin.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(KumiteError, match="not UTF-8"):
+        load_scene(str(tmp_path / "bin.toml"))
+
+
+# Sparring ----------------------------------------------------------------------------------------
+
+
+def test_the_same_seed_gives_the_same_bytes(sparring: LiveScene, tmp_path):
+    for name, seed in (("a", 3), ("b", 3), ("c", 4)):
+        sparring.reset(seed)
+        save_recording(tmp_path / name, record(sparring, 5.0))
+    a, b, c = ((tmp_path / n).read_bytes() for n in "abc")
+    assert a == b and a != c
+
+
+def test_two_boxers_fight(fight: Recording):
+    m = measure(fight)
+    assert fight.seconds == 30.0 and m.seconds == 30.0
+    assert m.min_separation_m is not None and m.min_separation_m > 0.25
+    for c in m.characters:
+        assert c.thrown >= c.landed >= 1
+        assert c.facing_share is not None and c.facing_share > 0.6
+        assert c.skate_ratio is not None and c.skate_ratio < 1.5
+        assert c.join_jump_m_s < 0.6
+        assert c.variety > 0.2
+
+
+def test_hits_are_where_a_fist_and_a_body_are(fight: Recording, sparring: LiveScene):
+    hits = [e for e in fight.events if e.kind == "hit"]
+    assert hits
+    for e in hits:
+        attacker = fight.clip(e.character)
+        from kumite.clip import forward_kinematics
+
+        pose = [x[e.frame : e.frame + 1] for x in (attacker.root_position, attacker.wxyz)]
+        position, world = forward_kinematics(fight.skeleton, *pose)
+        fist = tip_positions(fight.skeleton, e.data["limb"], position, world)[0]
+        moved = e.data["speed"] / fight.fps
+        assert np.linalg.norm(fist - e.data["place"]) < 0.12 + 2 * moved
+        assert e.data["part"] in ("head", "neck", "chest", "waist")
+        assert e.data["victim"] != e.character
+        assert (e.frame - 1) / fight.fps <= e.data["time"] + 1e-3 <= e.frame / fight.fps + 2e-3
+
+
+def test_a_blow_lands_once(fight: Recording):
+    last: dict[tuple, int] = {}
+    for e in fight.events:
+        if e.kind == "hit":
+            key = (e.character, e.data["limb"], e.data["blow"])
+            assert e.frame - last.get(key, -1000) > 5
+            last[key] = e.frame
+
+
+def test_a_struck_body_shows_it(library: Library):
+    """The victim's head is displaced along the blow in the frames after a hit."""
+    scene = LiveScene(load_scene("sparring"), library, seed=1)
+    moved = []
+    for _ in range(int(20 * scene.fps)):
+        seen = len(scene.events)
+        scene.step()
+        for e in scene.events[seen:]:
+            if e.kind == "hit" and e.data["part"] == "head":
+                k = scene.names.index(e.data["victim"])
+                moved.append(float(np.abs(scene.cast._reaction_velocity[k]).max()))
+    assert moved and min(moved) > 0.1
+
+
+def test_decisions_are_logged_with_what_was_considered(fight: Recording):
+    decisions = [e for e in fight.events if e.kind == "decision"]
+    assert len(decisions) > 20
+    assert all(e.data["considered"] >= 1 and e.data["apart"] >= 0 for e in decisions)
+
+
+# The target --------------------------------------------------------------------------------------
+
+
+def test_a_boxer_goes_for_the_target_wherever_it_is_put(library: Library):
+    scene = LiveScene(load_scene("target"), library, seed=0)
+    for place in ([0.0, 1.5, 1.2], [-1.5, 1.45, -1.0]):
+        scene.move_object("target", np.array(place))
+        before = sum(e.kind == "hit" for e in scene.events)
+        for _ in range(int(15 * scene.fps)):
+            scene.step()
+        gap = np.hypot(*(scene.root_position[0, [0, 2]] - np.array(place)[[0, 2]]))
+        assert gap < 1.3, place
+        assert sum(e.kind == "hit" for e in scene.events) > before, place
+
+
+def test_a_struck_target_swings_and_comes_back(library: Library):
+    scene = LiveScene(load_scene("target"), library, seed=0)
+    home = scene.objects[0].position.copy()
+    scene._swing[0] = np.array([1.0, 0.0, 0.0])
+    far = 0.0
+    for _ in range(int(3 * scene.fps)):
+        scene._swing_objects()
+        far = max(far, float(np.linalg.norm(scene.objects[0].position - home)))
+    assert 0.05 < far < 0.3
+    assert np.allclose(scene.objects[0].position, home, atol=0.02)
+
+
+# Recordings and metrics --------------------------------------------------------------------------
+
+
+def test_recordings_round_trip(fight: Recording, tmp_path):
+    save_recording(tmp_path / "a.rec", fight)
+    back = load_recording(tmp_path / "a.rec")
+    assert back.names == fight.names and back.fps == fight.fps
+    assert np.array_equal(back.wxyz, fight.wxyz)
+    assert [(e.frame, e.kind, dict(e.data)) for e in back.events] == [
+        (e.frame, e.kind, dict(e.data)) for e in fight.events
+    ]
+    save_recording(tmp_path / "b.rec", back)
+    assert (tmp_path / "a.rec").read_bytes() == (tmp_path / "b.rec").read_bytes()
+    assert measure(back) == measure(fight)
+
+
+def test_playback_shows_the_recording(fight: Recording):
+    play = Playback(fight)
+    frames = 1
+    while play.step():
+        frames += 1
+    assert frames == len(fight)
+    play.seek(10)
+    assert np.allclose(play.wxyz, fight.wxyz[10])
+    assert all(e.frame <= 10 for e in play.events)
+
+
+def test_one_character_alone(fight: Recording):
+    red = fight.only("red")
+    assert red.names == ("red",) and np.array_equal(red.wxyz[:, 0], fight.wxyz[:, 0])
+    with pytest.raises(KumiteError, match="unknown character 'green'"):
+        fight.only("green")
+
+
+def _standing(positions: list[list[float]], yaws: list[float], frames: int = 31) -> Recording:
+    """Characters that stand still, but for the first, which slides 1 m to its left in a second."""
+    s = toys.skeleton()
+    count = len(positions)
+    root = np.zeros((frames, count, 3))
+    root[:] = [[x, toys.HIP_HEIGHT, z] for x, z in positions]
+    root[:, 0, 0] += np.arange(frames) / (frames - 1)
+    wxyz = np.zeros((frames, count, len(s), 4))
+    wxyz[..., 0] = 1
+    wxyz[:, :, 0] = from_yaw(np.array(yaws))
+    names = tuple("abc"[:count])
+    return Recording(
+        "test",
+        30.0,
+        s,
+        names,
+        root,
+        wxyz,
+        np.ones((frames, count, 2), bool),
+        np.tile(np.arange(frames)[:, None], (1, count)),
+        events=(Event(3, "strike", "a", {}), Event(5, "hit", "a", {})),
+        settings={"aims_at": {"a": "b", "b": "a"}, "source_skate_m_s": 0.5},
+    )
+
+
+def test_metrics_of_a_scene_worked_by_hand():
+    m = measure(_standing([[0, 0], [0, 2]], [0.0, 0.0]))
+    a, b = m.characters
+    assert m.min_separation_m == pytest.approx(2.0)
+    assert (a.thrown, a.landed, b.thrown) == (1, 1, 0)
+    assert a.skate_m_s == pytest.approx(1.0, rel=1e-5) and a.skate_ratio == pytest.approx(2.0)
+    assert b.skate_m_s == 0
+    assert a.facing_share == 1.0 and b.facing_share == 0.0  # b looks away
+    assert a.join_jump_m_s == 0 and a.joins == 0
+
+
+def test_join_jumps_are_changes_of_the_roots_speed():
+    r = _standing([[0, 0], [0, 2]], [0.0, np.pi])
+    root = r.root_position.copy()
+    root[15:, 0, 0] += np.linspace(0, 1, 16)  # from 1 m/s to 3 m/s
+    shown = r.library_frame.copy()
+    shown[16:, 0] += 100
+    from dataclasses import replace
+
+    m = measure(replace(r, root_position=root, library_frame=shown))
+    assert m.characters[0].joins == 1
+    assert m.characters[0].join_jump_m_s == pytest.approx(2.0, rel=1e-3)
+
+
+def test_source_skate_is_the_clips_own(library: Library):
+    clips = library.clips
+    position, _ = clips.world
+    by_clip = [
+        foot_skate(
+            clips.skeleton, position[a:b], library.contacts.on_ground[a:b], clips.fps
+        )
+        for a, b in zip(clips.clip_start[:-1], clips.clip_start[1:])
+    ]
+    assert min(by_clip) <= source_skate(library) <= max(by_clip)
+
+
+@pytest.mark.slow
+def test_five_minutes_of_the_real_boxer(boxer: Library):
+    """The figures that a fight on real motion must reach, over several seeds."""
+    scene = LiveScene(load_scene("sparring"), boxer)
+    landed = {"red": 0, "blue": 0}
+    facing, skate = [], []
+    for seed in range(5):
+        scene.reset(seed)
+        m = measure(record(scene, 60.0))
+        assert m.min_separation_m is not None and m.min_separation_m >= 0.25
+        for c in m.characters:
+            landed[c.name] += c.landed
+            facing.append(c.facing_share)
+            skate.append(c.skate_ratio)
+            assert c.join_jump_m_s <= 0.3
+    assert all(n >= 30 for n in landed.values())  # one in ten seconds
+    assert np.mean(facing) >= 0.8 and max(skate) <= 1.5
