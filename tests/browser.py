@@ -92,9 +92,7 @@ def open_page(url: str, size: tuple[int, int] = SIZE) -> Iterator[tuple[Page, Tr
             browser.close()
 
 
-def wait_until(
-    page: Page, condition: Callable[[], bool], what: str, seconds: float = 30.0
-) -> None:
+def wait_until(page: Page, condition: Callable[[], bool], what: str, seconds: float = 30.0) -> None:
     """Let the page run until ``condition`` holds; fails after ``seconds`` naming ``what``."""
     end = time.perf_counter() + seconds
     while not condition():
@@ -108,7 +106,9 @@ def picture(page: Page) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB"))
 
 
-def save_picture(url: str, path: Path, size: tuple[int, int] = (1280, 800), wait: float = 6) -> None:
+def save_picture(
+    url: str, path: Path, size: tuple[int, int] = (1280, 800), wait: float = 6
+) -> None:
     """A picture of a running studio for the documentation, ``wait`` seconds after it appears."""
     with open_page(url, size) as (page, _):
         page.wait_for_selector("canvas")

@@ -39,7 +39,9 @@ def distances(quaternion, weight, feature):
     for a in range(count):
         for b in range(count):
             for j in range(len(weight)):
-                dot = abs(sum(float(quaternion[j, c, a]) * float(quaternion[j, c, b]) for c in range(4)))
+                dot = abs(
+                    sum(float(quaternion[j, c, a]) * float(quaternion[j, c, b]) for c in range(4))
+                )
                 out[a, b] += float(weight[j]) * (2 * math.acos(min(dot, 1.0))) ** 2
             for row in feature:
                 out[a, b] += (float(row[a]) - float(row[b])) ** 2
@@ -103,7 +105,9 @@ def polar_value(value, grid, point):
         table = np.concatenate([table, table[:1]])
         angle = (angle - grid.low[0]) % (2 * math.pi) + grid.low[0]
     if len(heights) > 1:
-        table = np.array([[np.interp(point[1], heights, line) for line in plane] for plane in table])
+        table = np.array(
+            [[np.interp(point[1], heights, line) for line in plane] for plane in table]
+        )
     else:
         table = table[..., 0]
     line = [np.interp(distance, distances_, row) for row in table]
@@ -135,7 +139,7 @@ def value_iteration(table, reward, discount, grid, sweeps):
 
 
 def first_touch(p0, p1, a0, a1, b0, b1, radius_a, radius_b, radius, steps=4000):
-    """First time 0..1 of contact of a moving sphere and a moving tapered capsule, by brute force."""
+    """First time 0..1 at which a moving sphere and a moving capsule touch, by brute force."""
     for k in range(steps + 1):
         t = k / steps
         p, a, b = (u + t * (v - u) for u, v in ((p0, p1), (a0, a1), (b0, b1)))

@@ -17,7 +17,9 @@ def lifted(frames: int = 60, start: int = 20, stop: int = 40, fps: float = 30.0)
     """Stands, but for the left leg, which is bent up between two frames."""
     c = toys.still(frames, fps=fps)
     wxyz = c.wxyz.copy()
-    t = np.clip((np.arange(frames) - start) / 5, 0, 1) * np.clip((stop - np.arange(frames)) / 5, 0, 1)
+    t = np.clip((np.arange(frames) - start) / 5, 0, 1) * np.clip(
+        (stop - np.arange(frames)) / 5, 0, 1
+    )
     wxyz[:, c.skeleton.joint("left_thigh")] = from_axis_angle([1, 0, 0], -1.2 * t)
     wxyz[:, c.skeleton.joint("left_shin")] = from_axis_angle([1, 0, 0], 1.6 * t)
     return Clip("lifted", c.skeleton, fps, c.root_position, wxyz)
@@ -77,7 +79,10 @@ def test_slow_and_backward_fists_are_no_blows():
 
 def test_blows_end_at_clip_borders():
     two = [punch(4.0), punch(4.0)]
-    cut = [Clip(f"c{i}", c.skeleton, c.fps, c.root_position[25:35], c.wxyz[25:35]) for i, c in enumerate(two)]
+    cut = [
+        Clip(f"c{i}", c.skeleton, c.fps, c.root_position[25:35], c.wxyz[25:35])
+        for i, c in enumerate(two)
+    ]
     strikes = find_strikes(concatenate(cut))
     assert list(strikes.start) == [0, 10] and list(strikes.stop) == [10, 20]
 

@@ -133,7 +133,6 @@ def test_scenes_are_listed(kumite):
     assert {"sparring", "target"} <= set(json.loads(text))
 
 
-
 HEADER = """HIERARCHY
 ROOT hips
 {
@@ -221,7 +220,9 @@ def test_a_damaged_or_other_version_of_a_library(kumite, built: Path, tmp_path: 
     (tmp_path / "cut.kumite").write_bytes(whole[: len(whole) // 2])
     status, _, err = kumite("run", "sparring", "-l", "cut.kumite")
     assert status == 2 and "cut.kumite: damaged" in err
-    (tmp_path / "new.kumite").write_bytes(whole.replace(b'\\"version\\": 1', b'\\"version\\": 9', 1))
+    (tmp_path / "new.kumite").write_bytes(
+        whole.replace(b'\\"version\\": 1', b'\\"version\\": 9', 1)
+    )
     status, _, err = kumite("run", "sparring", "-l", "new.kumite")
     assert status == 2 and "version 9" in err
 

@@ -50,5 +50,8 @@ def test_a_failed_write_leaves_the_old_file_and_no_other(tmp_path):
 
 def test_a_folder_that_cannot_be_written_is_said(tmp_path):
     (tmp_path / "file").write_text("in the way")
-    with pytest.raises(KumiteError, match="cannot be written"), files.writing(tmp_path / "file" / "x"):
+    with (
+        pytest.raises(KumiteError, match="cannot be written"),
+        files.writing(tmp_path / "file" / "x"),
+    ):
         pass

@@ -119,7 +119,9 @@ def test_library_file_round_trips(library: Library, tmp_path):
 
 def test_a_library_with_shapes_that_do_not_fit_is_damaged(library: Library, tmp_path):
     path = tmp_path / "bad.kumite"
-    clips = replace(library.clips, clip_start=np.array([0, 5, len(library.clips)]), names=("a", "b"))
+    clips = replace(
+        library.clips, clip_start=np.array([0, 5, len(library.clips)]), names=("a", "b")
+    )
     save_library(path, replace(library, clips=clips))
     load_library(path)  # two clips, two starts: fits
     object.__setattr__(clips, "names", ("a",))

@@ -10,8 +10,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kumite.annotate import Contacts, Strikes
-from kumite.control import Behaviour, Fighter, Skill, TargetGrid, Temper, approach, approach_grid
-from kumite.control import solve, stretch_tracks, strike, strike_grid, trained
+from kumite.control import (
+    Behaviour,
+    Fighter,
+    Skill,
+    TargetGrid,
+    Temper,
+    approach,
+    approach_grid,
+    solve,
+    stretch_tracks,
+    strike,
+    strike_grid,
+    trained,
+)
 from kumite.control.policy import frame_discount, stretch_rewards
 from kumite.errors import KumiteError
 from kumite.graph import ActionTable, Library
@@ -22,7 +34,7 @@ FPS = 30.0
 
 
 def toy_library(table: ActionTable, frames: int, tips: dict[int, tuple] | None = None) -> Library:
-    """A library whose body stands still; ``tips``: frame -> (place [3], speed) of left-hand hits."""
+    """A library whose body stands still; tips: frame -> (place [3], speed) of left-hand hits."""
     clips = toys.clip_set([frames])
     effective = np.zeros((frames, 4), bool)
     tip, speed = np.zeros((frames, 4, 3)), np.zeros((frames, 4))
@@ -73,7 +85,7 @@ def test_the_discount_means_the_same_at_any_rate():
 
 @pytest.mark.jit_off
 def test_sweeps_equal_the_twin(library: Library):
-    """A few states of the performer's graph, both behaviours, point by point and action by action."""
+    """A few states of the performer's graph, both behaviours, point by point, action by action."""
     small = _few_states(library)
     behaviours = (
         replace(approach(), grid=approach_grid(2.0, 3, 5)),
@@ -92,9 +104,11 @@ def test_sweeps_equal_the_twin(library: Library):
 def _few_states(library: Library, count: int = 6) -> Library:
     """The first stretches of a library as a table of its own, each state with all of them."""
     t = library.table
-    hits = library.strikes.effective.any(axis=1)
+    hits: np.ndarray = library.strikes.effective.any(axis=1)
     busy = [k for k in range(len(t.first)) if hits[t.first[k] : t.last[k] + 1].any()]
-    pick = np.array((busy[: count // 2] + [k for k in range(len(t.first)) if k not in busy])[:count])
+    pick = np.array(
+        (busy[: count // 2] + [k for k in range(len(t.first)) if k not in busy])[:count]
+    )
     every = np.arange(count, dtype=np.int32)
     table = ActionTable(
         t.last[pick],
@@ -117,6 +131,13 @@ def test_values_satisfy_equation_4_within_the_residual(library: Library):
         assert solved.converged and gap <= 1e-5
 
 
+def interpolated(value: np.ndarray, grid: TargetGrid, point) -> float:
+    low, step, size, wraps, inside = grid.kernel_arguments()
+    x, y, z = point
+    index, weight = np.zeros(8, np.int64), np.zeros(8)
+    return kernels.interpolate(value, x, y, z, low, step, size, wraps, inside, index, weight)
+
+
 points = st.tuples(st.floats(-2.5, 2.5), st.floats(0.5, 2.2), st.floats(-2.5, 2.5))
 
 
@@ -130,9 +151,7 @@ def test_interpolation_equals_the_twin(point, seed):
         TargetGrid((-1.1, 0.3, 1.2), (1.3, 1.3, 1.6), (10, 10, 4), wraps=False, inside_only=True),
     ):
         value = rng.normal(0, 1, len(grid)).astype(np.float32)
-        got = kernels.interpolate(
-            value, *point, *grid.kernel_arguments(), np.zeros(8, np.int64), np.zeros(8)
-        )
+        got = interpolated(value, grid, point)
         assert got == pytest.approx(reference.polar_value(value, grid, point), abs=1e-4)
 
 
@@ -142,9 +161,7 @@ def test_interpolation_is_exact_on_grid_points():
         for m, p in enumerate(grid.points):
             if np.hypot(p[0], p[2]) < 1e-9:
                 continue  # all angles meet at the centre
-            got = kernels.interpolate(
-                value, *p, *grid.kernel_arguments(), np.zeros(8, np.int64), np.zeros(8)
-            )
+            got = interpolated(value, grid, p)
             assert got == pytest.approx(m, abs=2e-3)
 
 
@@ -202,7 +219,10 @@ def test_look_ahead_agrees_with_the_table_for_a_standing_target(library: Library
 
 def test_fighters_keep_their_space_and_do_not_repeat_themselves(library: Library):
     skill = Skill(
-        library, solve(library, approach()), solve(library, strike(library)), stretch_tracks(library)
+        library,
+        solve(library, approach()),
+        solve(library, strike(library)),
+        stretch_tracks(library),
     )
     target = np.array([[0.0, 1.5, 0.7]])
     state = int(np.argmax(np.diff(library.table.action_start)))

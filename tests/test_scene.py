@@ -317,9 +317,7 @@ def test_source_skate_is_the_clips_own(library: Library):
     clips = library.clips
     position, _ = clips.world
     by_clip = [
-        foot_skate(
-            clips.skeleton, position[a:b], library.contacts.on_ground[a:b], clips.fps
-        )
+        foot_skate(clips.skeleton, position[a:b], library.contacts.on_ground[a:b], clips.fps)
         for a, b in zip(clips.clip_start[:-1], clips.clip_start[1:])
     ]
     assert min(by_clip) <= source_skate(library) <= max(by_clip)

@@ -31,7 +31,9 @@ Source = Annotated[
 ]
 LibraryOption = Annotated[
     Path | None,
-    typer.Option("--library", "-l", help="A library built with 'kumite build' (default: built-in)."),
+    typer.Option(
+        "--library", "-l", help="A library built with 'kumite build' (default: built-in)."
+    ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for scripts.")]
 ScaleOption = Annotated[
@@ -122,9 +124,7 @@ def _print_json(value: Any) -> None:
     print(json.dumps(value, indent=2))
 
 
-def _load_clips(
-    source: list[str], fps, file_fps, metres_per_unit, up_axis, ground, role
-) -> Any:
+def _load_clips(source: list[str], fps, file_fps, metres_per_unit, up_axis, ground, role) -> Any:
     from kumite import mocap
 
     with _progress() as bars:
@@ -168,7 +168,8 @@ def info(
         owner = clips.clip_of_frame[strikes.frame]
         for c, name in enumerate(clips.names):
             hits[name] = {
-                limb: int(((owner == c) & (strikes.limb == k)).sum()) for k, limb in enumerate(LIMBS)
+                limb: int(((owner == c) & (strikes.limb == k)).sum())
+                for k, limb in enumerate(LIMBS)
             }
     scales = sorted({i.metres_per_unit for i in loaded.info})
     problems = [p for clip in loaded.clips for p in check(clip)]
@@ -400,7 +401,8 @@ def _export(recording: Any, path: Path, character: str | None) -> None:
 def export(
     recording: Annotated[Path, typer.Argument(help="A .rec file.")],
     output: Annotated[
-        list[Path], typer.Option("--output", "-o", help="Write .glb, .bvh or .png; may be repeated.")
+        list[Path],
+        typer.Option("--output", "-o", help="Write .glb, .bvh or .png; may be repeated."),
     ],
     character: Annotated[
         str | None, typer.Option(help="Which character (a BVH file holds one).")

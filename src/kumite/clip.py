@@ -177,7 +177,9 @@ class Clip:
     skeleton: Skeleton
     fps: float
     root_position: np.ndarray  # [F, 3] m
-    wxyz: np.ndarray  # [F, J, 4] each joint's rotation from its parent's axes; the root's from world
+    wxyz: (
+        np.ndarray
+    )  # [F, J, 4] each joint's rotation from its parent's axes; the root's from world
     notes: tuple[str, ...] = ()  # what was inferred or repaired on the way in
 
     def __post_init__(self) -> None:

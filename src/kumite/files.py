@@ -72,12 +72,15 @@ def load(path: Path | str, kind: str, version: int) -> tuple[dict[str, Any], dic
         meta = json.loads(json.loads(blob[8 : 8 + size])["__metadata__"][META_KEY])
         found, number, header = meta["kind"], meta["version"], meta["header"]
     except (ValueError, KeyError, TypeError, MemoryError, OverflowError):
-        raise KumiteError(f"{path}: damaged, or not a file of Kumite's; expected a {kind}") from None
+        raise KumiteError(
+            f"{path}: damaged, or not a file of Kumite's; expected a {kind}"
+        ) from None
     if found != kind:
         raise KumiteError(f"{path}: this is a {found}; expected a {kind}")
     if number != version:
         raise KumiteError(
-            f"{path}: {kind} of version {number}; this Kumite reads version {version}: build it again"
+            f"{path}: {kind} of version {number}; this Kumite reads version {version}: "
+            "build it again"
         )
     try:
         return header, load_tensors(blob)

@@ -121,7 +121,7 @@ def continuous(wxyz: ArrayLike) -> np.ndarray:
 
 
 def from_euler(order: str, angles: ArrayLike, *, degrees: bool) -> np.ndarray:
-    """Quaternions [..., 4] of Euler angles [..., n]; ``order`` as SciPy: 'ZYX' turns with the body."""
+    """Quaternions [..., 4] of Euler angles [..., n]; order as SciPy: 'ZYX' turns with the body."""
     a = np.asarray(angles, dtype=np.float64)
     flat = Rotation.from_euler(order, a.reshape(-1, len(order)), degrees=degrees)
     return flat.as_quat(scalar_first=True).reshape(*a.shape[:-1], 4)

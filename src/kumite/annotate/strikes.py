@@ -39,7 +39,7 @@ class Strikes:
 
     @property
     def points(self) -> np.ndarray:
-        """Effective hitting points [P, 3] in their facing frames: the tip at each effective frame."""
+        """Effective hitting points [P, 3]: the tip at each effective frame, in its facing frame."""
         return self.tip[self.effective]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
@@ -64,8 +65,6 @@ def trained(
             "backups": policy.backups,
             "seconds": policy.seconds,
         }
-        try:
+        with contextlib.suppress(KumiteError):
             files.save(path, KIND, VERSION, header, {"value": policy.value})
-        except KumiteError:
-            pass
     return policy

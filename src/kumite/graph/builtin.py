@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
@@ -31,8 +32,6 @@ def builtin_library(
             pass  # damaged or of another version: made anew
     library = build_library(clips, progress=progress)
     if path is not None:
-        try:
+        with contextlib.suppress(KumiteError):  # a cache that cannot be written only costs time
             save_library(path, library)
-        except KumiteError:
-            pass  # a cache that cannot be written only costs time
     return library

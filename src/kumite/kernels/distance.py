@@ -13,8 +13,8 @@ from numpy.polynomial import Chebyshev, Polynomial
 
 from kumite.kernels.jit import kernel, parallel_kernel
 
-# (2 acos(1 - y))² is smooth in y on [0, 1], so a polynomial gives it to 4e-7, float32 rounding, without
-# the square root and the branch of acos that would keep the loop from running in vector registers.
+# (2 acos(1 - y))² is smooth in y on [0, 1], so a polynomial gives it to 4e-7, float32 rounding,
+# without the root and the branch of acos that would keep the loop out of vector registers.
 _FIT = Chebyshev.interpolate(
     lambda y: np.where(
         y < 1e-4, 8.0 + y * (4.0 / 3.0), (2.0 * np.arccos(1.0 - y)) ** 2 / np.maximum(y, 1e-4)
@@ -150,7 +150,7 @@ def local_minima(
 
 @parallel_kernel
 def row_sums(quaternion, weight, feature, out):
-    """Σ_b D(a, b) for every pose a into ``out`` [P] float64: the distance stage alone, to time it."""
+    """Σ_b D(a, b) for every pose a into ``out`` [P] float64: the distance stage, to time it."""
     total = quaternion.shape[2]
     for task in prange((total + ROWS - 1) // ROWS):
         begin, end = task * ROWS, min(total, (task + 1) * ROWS)

@@ -61,15 +61,13 @@ def corners(x, y, z, low, step, size, wraps, inside_only, index, weight):
     u0 = u0 % size[0]
     u1 = (u0 + 1) % size[0]
     v1, h1 = min(v0 + 1, size[1] - 1), min(h0 + 1, heights - 1)
-    k = 0
     for c in range(count):
         du, dv, dh = c & 1, (c >> 1) & 1, (c >> 2) & 1
         iu = u1 if du else u0
         iv = v1 if dv else v0
         ih = h1 if dh else h0
-        index[k] = (iu * size[1] + iv) * heights + ih
-        weight[k] = (fu if du else 1.0 - fu) * (fv if dv else 1.0 - fv) * (fh if dh else 1.0 - fh)
-        k += 1
+        index[c] = (iu * size[1] + iv) * heights + ih
+        weight[c] = (fu if du else 1.0 - fu) * (fv if dv else 1.0 - fv) * (fh if dh else 1.0 - fh)
     return count
 
 
@@ -116,7 +114,7 @@ def approach_reward(track, discount, sigma, x, z):
 
 @kernel
 def strike_reward(tip, weight, when, discount, tolerance, x, y, z):
-    """max_t γ^t I(t) w(t)  (Eq. 6) over the effective frames: tip [P, 3], weight [P], when [P] ≥ 1."""
+    """max_t γ^t I(t) w(t)  (Eq. 6) over effective frames: tip [P, 3], weight [P], when [P] ≥ 1."""
     best = 0.0
     for p in range(tip.shape[0]):
         d2 = (tip[p, 0] - x) ** 2 + (tip[p, 1] - y) ** 2 + (tip[p, 2] - z) ** 2

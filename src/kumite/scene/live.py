@@ -10,7 +10,7 @@ import numpy as np
 
 from kumite.body import lay_body
 from kumite.clip import LIMBS
-from kumite.control import Fighter, Skill, Temper, approach, strike, stretch_tracks, trained
+from kumite.control import Fighter, Skill, Temper, approach, stretch_tracks, strike, trained
 from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.kernels import blow as kernels

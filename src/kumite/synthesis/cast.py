@@ -23,7 +23,7 @@ SPINE_SHARES = 3.0  # how much more readily each joint up the spine gives way th
 
 
 class Cast:
-    """K characters. Arrays named as in ``kernels/character.py``; outputs are overwritten a frame."""
+    """K characters. Arrays named as in ``kernels/character.py``; each frame overwrites the last."""
 
     def __init__(self, library: Library, count: int) -> None:
         self.library = library
@@ -66,7 +66,7 @@ class Cast:
 
     @property
     def waiting(self) -> np.ndarray:
-        """Characters [..] whose action has ended: each must :meth:`begin` another before a step."""
+        """Characters whose action has ended: each must :meth:`begin` another before a step."""
         return np.flatnonzero(self.frame >= self.stop)
 
     def place(self, k: int, state: int, facing: np.ndarray) -> None:
@@ -158,7 +158,7 @@ class Cast:
         self._foot_offset[k, :, 2] -= dz
 
     def strike(self, k: int, joint: int, point: np.ndarray, displacement: np.ndarray) -> None:
-        """Displace a struck segment: ``point`` [3] moves by about ``displacement`` [3] and recovers.
+        """Displace a struck segment: ``point`` moves by about ``displacement`` [3] and recovers.
 
         One Jacobian step of inverse kinematics over the joints from the pelvis to the struck one,
         the upper ones giving way more readily (Lee & Lee 2004, section 6, reaction), played by a

@@ -1,0 +1,15 @@
+"""Two boxers of the built-in performer spar for ten seconds; the fight leaves as GLB."""
+
+from kumite.export.gltf import write_glb
+
+from kumite import LiveScene, builtin_library, load_scene, measure, record
+
+library = builtin_library(None)
+print(f"{library.table.states} states, {library.table.actions} actions")
+
+scene = LiveScene(load_scene("sparring"), library, seed=7)
+fight = record(scene, seconds=10)
+for boxer in measure(fight).characters:
+    print(f"{boxer.name}: {boxer.thrown} thrown, {boxer.landed} landed")
+
+write_glb("spar.glb", fight)

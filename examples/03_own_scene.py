@@ -1,0 +1,37 @@
+"""A scene of one's own: three boxers in a ring, each after the next one; and its event log."""
+
+from pathlib import Path
+
+from kumite import LiveScene, builtin_library, load_scene, record, save_recording
+
+Path("ring.toml").write_text(
+    """
+title = "Each after the next"
+
+[[character]]
+name = "ann"
+position = [0.0, -0.8]
+aims_at = "bea"
+
+[[character]]
+name = "bea"
+position = [-0.8, 0.6]
+yaw_deg = 120
+aims_at = "cy"
+
+[[character]]
+name = "cy"
+position = [0.8, 0.6]
+yaw_deg = -120
+aims_at = "ann"
+strike = 5.0
+"""
+)
+scene = LiveScene(load_scene("ring.toml"), builtin_library(None), seed=2)
+fight = record(scene, seconds=20)
+for event in fight.events:
+    if event.kind == "hit":
+        d = event.data
+        print(f"{d['time']:6.2f} s  {event.character} hits {d['victim']}'s {d['part']} "
+              f"with the {d['limb'].replace('_', ' ')} at {d['speed']:.1f} m/s")  # fmt: skip
+save_recording("ring.rec", fight)
