@@ -104,7 +104,7 @@ def test_sweeps_equal_the_twin(library: Library):
 def _few_states(library: Library, count: int = 6) -> Library:
     """The first stretches of a library as a table of its own, each state with all of them."""
     t = library.table
-    hits: np.ndarray = library.strikes.effective.any(axis=1)
+    hits = np.asarray(library.strikes.effective.any(axis=1))
     busy = [k for k in range(len(t.first)) if hits[t.first[k] : t.last[k] + 1].any()]
     pick = np.array(
         (busy[: count // 2] + [k for k in range(len(t.first)) if k not in busy])[:count]

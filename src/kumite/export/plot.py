@@ -52,7 +52,9 @@ def plot_hits(path: Path | str, strikes: Strikes, title: str) -> None:
             axis.invert_xaxis()  # the body's left is +X: seen from behind it is on the left
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(LIMBS), fontsize=9)
-    figure.suptitle(f"{title}: {len(strikes)} blows, {len(strikes.points)} effective hitting points")
+    figure.suptitle(
+        f"{title}: {len(strikes)} blows, {len(strikes.points)} effective hitting points"
+    )
     suffix = Path(path).suffix.lower().removeprefix(".") or "png"
     if suffix not in figure.canvas.get_supported_filetypes():
         pyplot.close(figure)
