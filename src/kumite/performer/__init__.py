@@ -29,17 +29,17 @@ TAKES: dict[str, tuple[tuple[str, ...], int]] = {
     # name: the moves that it draws from, and how many of them are performed
     "guard": (("guard", "guard_shift"), 12),
     "footwork": (("step_forward", "step_back", "step_left", "step_right", "guard"), 26),
-    "turns": (("turn_left", "turn_right", "turn_left", "turn_right", "step_forward", "step_back"), 22),
-    "jab": (("jab", "jab", "guard", "step_back", "turn_left", "turn_right"), 26),
-    "cross": (("cross", "cross", "guard", "step_back", "turn_left", "turn_right"), 24),
-    "hooks": (("left_hook", "right_hook", "guard", "step_back", "turn_left", "turn_right"), 24),
-    "one_two": (("one_two", "one_two", "step_back", "guard", "turn_left", "turn_right"), 20),
+    "turns": (("turn_left", "turn_right", "turn_left", "turn_right", "step_back"), 22),
+    "jab": (("jab", "jab", "guard", "step_back", "turn_left", "turn_right"), 36),
+    "cross": (("cross", "cross", "guard", "step_back", "turn_left", "turn_right"), 34),
+    "hooks": (("left_hook", "right_hook", "guard", "step_back", "turn_left", "turn_right"), 34),
+    "one_two": (("one_two", "one_two", "step_back", "guard", "turn_left", "turn_right"), 30),
     "duck": (("duck", "guard", "step_left", "step_right", "jab"), 18),
     "struck": (
         ("struck_head_front", "struck_head_left", "struck_head_right", "guard", "step_forward"),
         18,
     ),
-    "shadow": (tuple(m.label for m in MOVES if m.kind != "reaction"), 36),
+    "shadow": (tuple(m.label for m in MOVES if m.kind != "reaction"), 48),
 }  # fmt: skip
 
 

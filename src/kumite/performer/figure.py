@@ -219,7 +219,7 @@ def _two_bones(
 
 
 def _frame(bone: np.ndarray, hinge: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    """Rotations [F, 4] that turn ``axis`` onto the bone and keep the joint's side axis on the hinge.
+    """Rotations [F, 4] that turn ``axis`` onto the bone, the joint's side axis on the hinge.
 
     The side axis at rest is +X for a leg (knees bend about it) and ∓Y for an arm in a T.
     """
@@ -237,5 +237,3 @@ def _from_matrix(m: np.ndarray) -> np.ndarray:
     from scipy.spatial.transform import Rotation
 
     return Rotation.from_matrix(m).as_quat(scalar_first=True)
-
-

@@ -306,9 +306,7 @@ def _alive(at: np.ndarray, rng: np.random.Generator) -> dict[str, np.ndarray]:
     }
 
 
-def _strikes(
-    clip: Clip, score: Sequence[Performed], starts: Sequence[float]
-) -> tuple[Strike, ...]:
+def _strikes(clip: Clip, score: Sequence[Performed], starts: Sequence[float]) -> tuple[Strike, ...]:
     position, world = forward_kinematics(clip.skeleton, clip.root_position, clip.wxyz)
     out = []
     for p, start in zip(score, starts):

@@ -1,0 +1,285 @@
+"""GLB out: one skinned, animated body a character, and the scene's objects as spheres.
+
+glTF 2.0: metres, right-handed, Y up like ours; only its quaternions are xyzw. Each joint is a node;
+the skin's inverse bind matrices undo the rest pose, in which no joint is turned. Joints that never
+turn get no animation channel; a channel's keys are the recording's frames.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pygltflib as gltf
+
+from kumite import files
+from kumite.body import BodyMesh, body_mesh, palette
+from kumite.body.mesh import ROLES
+from kumite.clip import NO_PARENT, Skeleton
+from kumite.errors import KumiteError
+from kumite.rotation import continuous
+from kumite.scene.recording import Recording
+
+GENERATOR = "Kumite"
+STILL = 1e-6  # a channel whose values differ by less than this is left out
+OBJECT_COLOUR = (0.95, 0.75, 0.15)
+OBJECT_RADIUS = 0.1  # m, where a recording does not say
+_ROUGHNESS = {"gloves": 0.35, "shoes": 0.45, "skin": 0.6}
+
+
+def write_glb(path: Path | str, recording: Recording) -> None:
+    """Write a recording as binary glTF. The file appears whole or not at all.
+
+    Errors: values that are not finite; a file that cannot be written.
+    """
+    if not (np.isfinite(recording.root_position).all() and np.isfinite(recording.wxyz).all()):
+        raise KumiteError(f"{path}: the recording holds values that are not finite")
+    document = _Document(recording.scene)
+    times = document.add_times(len(recording), recording.fps)
+    mesh = body_mesh(recording.skeleton)
+    skin_data = _share_mesh(document, mesh)
+    bind = document.add(_inverse_bind(recording.skeleton), gltf.MAT4)
+    for k, name in enumerate(recording.names):
+        _add_character(document, recording, k, name, skin_data, bind, times)
+    _add_objects(document, recording, times)
+    with files.writing(path) as temporary:
+        temporary.write_bytes(document.to_bytes())
+
+
+class _Document:
+    """A glTF document and its one buffer, filled from the front."""
+
+    def __init__(self, title: str) -> None:
+        self.root = gltf.GLTF2(
+            asset=gltf.Asset(version="2.0", generator=GENERATOR),
+            scene=0,
+            scenes=[gltf.Scene(name=title, nodes=[])],
+        )
+        self.animation = gltf.Animation(name=title, channels=[], samplers=[])
+        self._parts: list[bytes] = []
+        self._length = 0
+
+    def add(self, array: np.ndarray, kind: str, *, target: int | None = None, bounds=False) -> int:
+        """An array as an accessor in a buffer view of its own; returns the accessor."""
+        component = {
+            np.dtype(np.float32): gltf.FLOAT,
+            np.dtype(np.uint16): gltf.UNSIGNED_SHORT,
+            np.dtype(np.uint32): gltf.UNSIGNED_INT,
+        }[array.dtype]
+        blob = np.ascontiguousarray(array).tobytes()
+        blob += b"\0" * (-len(blob) % 4)
+        view = gltf.BufferView(
+            buffer=0, byteOffset=self._length, byteLength=array.nbytes, target=target
+        )
+        self._parts.append(blob)
+        self._length += len(blob)
+        self.root.bufferViews.append(view)
+        accessor = gltf.Accessor(
+            bufferView=len(self.root.bufferViews) - 1,
+            componentType=component,
+            count=len(array),
+            type=kind,
+        )
+        if bounds:
+            flat = array.reshape(len(array), -1)
+            accessor.min = flat.min(axis=0).tolist()
+            accessor.max = flat.max(axis=0).tolist()
+        self.root.accessors.append(accessor)
+        return len(self.root.accessors) - 1
+
+    def add_times(self, frames: int, fps: float) -> int:
+        return self.add((np.arange(frames) / fps).astype(np.float32), gltf.SCALAR, bounds=True)
+
+    def add_node(self, node: gltf.Node, *, top: bool = False) -> int:
+        self.root.nodes.append(node)
+        index = len(self.root.nodes) - 1
+        if top:
+            self.root.scenes[0].nodes.append(index)
+        return index
+
+    def add_material(self, name: str, colour: tuple[float, float, float], rough: float) -> int:
+        linear = [float(_to_linear(c)) for c in colour]
+        self.root.materials.append(
+            gltf.Material(
+                name=name,
+                pbrMetallicRoughness=gltf.PbrMetallicRoughness(
+                    baseColorFactor=[*linear, 1.0], metallicFactor=0.0, roughnessFactor=rough
+                ),
+            )
+        )
+        return len(self.root.materials) - 1
+
+    def animate(self, node: int, path: str, times: int, values: np.ndarray, kind: str) -> None:
+        """A linear channel, unless the values never change."""
+        if np.ptp(values, axis=0).max() < STILL:
+            return
+        output = self.add(values.astype(np.float32), kind)
+        self.animation.samplers.append(
+            gltf.AnimationSampler(input=times, output=output, interpolation="LINEAR")
+        )
+        self.animation.channels.append(
+            gltf.AnimationChannel(
+                sampler=len(self.animation.samplers) - 1,
+                target=gltf.AnimationChannelTarget(node=node, path=path),
+            )
+        )
+
+    def to_bytes(self) -> bytes:
+        if self.animation.channels:
+            self.root.animations.append(self.animation)
+        self.root.buffers.append(gltf.Buffer(byteLength=self._length))
+        self.root.set_binary_blob(b"".join(self._parts))
+        return b"".join(self.root.save_to_bytes())
+
+
+def _share_mesh(document: _Document, mesh: BodyMesh) -> list[tuple[str, dict[str, Any], int]]:
+    """Vertex data of each colour role, written once for all characters: role, attributes, faces."""
+    out = []
+    for r, role in enumerate(ROLES):
+        used = np.flatnonzero(mesh.role == r)
+        if len(used) == 0:
+            continue
+        span = slice(int(used[0]), int(used[-1]) + 1)
+        faces = mesh.faces[mesh.role[mesh.faces[:, 0]] == r] - span.start
+        attributes = {
+            "POSITION": document.add(
+                mesh.vertices[span], gltf.VEC3, target=gltf.ARRAY_BUFFER, bounds=True
+            ),
+            "NORMAL": document.add(mesh.normals[span], gltf.VEC3, target=gltf.ARRAY_BUFFER),
+            "JOINTS_0": document.add(mesh.joints[span], gltf.VEC4, target=gltf.ARRAY_BUFFER),
+            "WEIGHTS_0": document.add(mesh.weights[span], gltf.VEC4, target=gltf.ARRAY_BUFFER),
+        }
+        indices = document.add(
+            faces.astype(np.uint16).ravel(), gltf.SCALAR, target=gltf.ELEMENT_ARRAY_BUFFER
+        )
+        out.append((role, attributes, indices))
+    return out
+
+
+def _inverse_bind(skeleton: Skeleton) -> np.ndarray:
+    """Inverse bind matrices [J, 4, 4] float32, each column by column as glTF wants them."""
+    matrices = np.tile(np.eye(4, dtype=np.float32), (len(skeleton), 1, 1))
+    matrices[:, 3, :3] = -skeleton.rest_positions
+    return matrices
+
+
+def _add_character(
+    document: _Document,
+    recording: Recording,
+    k: int,
+    name: str,
+    skin_data: list[tuple[str, dict[str, Any], int]],
+    bind: int,
+    times: int,
+) -> None:
+    skeleton = recording.skeleton
+    colours = palette(k)
+    primitives = []
+    for role, attributes, indices in skin_data:
+        material = document.add_material(f"{name} {role}", colours[role], _ROUGHNESS.get(role, 0.8))
+        primitives.append(
+            gltf.Primitive(
+                attributes=gltf.Attributes(**attributes), indices=indices, material=material
+            )
+        )
+    document.root.meshes.append(gltf.Mesh(name=f"{name} body", primitives=primitives))
+
+    xyzw = np.roll(continuous(recording.wxyz[:, k]), -1, axis=-1)
+    xyzw = xyzw / np.linalg.norm(xyzw, axis=-1, keepdims=True)
+    first = len(document.root.nodes)
+    for j, joint in enumerate(skeleton.names):
+        parent = skeleton.parents[j]
+        at = recording.root_position[0, k] if parent == NO_PARENT else skeleton.offsets[j]
+        document.add_node(
+            gltf.Node(
+                name=f"{name}:{joint}",
+                translation=[float(x) for x in at],
+                rotation=_unit(xyzw[0, j]),
+                children=[first + c for c in skeleton.children(j)],
+            ),
+            top=parent == NO_PARENT,
+        )
+        document.animate(first + j, "rotation", times, xyzw[:, j], gltf.VEC4)
+    document.animate(first, "translation", times, recording.root_position[:, k], gltf.VEC3)
+
+    document.root.skins.append(
+        gltf.Skin(
+            name=name,
+            joints=list(range(first, first + len(skeleton))),
+            inverseBindMatrices=bind,
+            skeleton=first,
+        )
+    )
+    document.add_node(
+        gltf.Node(name=name, mesh=len(document.root.meshes) - 1, skin=len(document.root.skins) - 1),
+        top=True,
+    )
+
+
+def _unit(xyzw: np.ndarray) -> list[float]:
+    """A quaternion whose float64 numbers have unit length, as the specification wants."""
+    q = xyzw.astype(np.float64)
+    return (q / np.linalg.norm(q)).tolist()
+
+
+def _add_objects(document: _Document, recording: Recording, times: int) -> None:
+    if not recording.objects:
+        return
+    vertices, faces = _sphere()
+    attributes = gltf.Attributes(
+        POSITION=document.add(vertices, gltf.VEC3, target=gltf.ARRAY_BUFFER, bounds=True),
+        NORMAL=document.add(vertices, gltf.VEC3, target=gltf.ARRAY_BUFFER),
+    )
+    indices = document.add(faces.ravel(), gltf.SCALAR, target=gltf.ELEMENT_ARRAY_BUFFER)
+    material = document.add_material("object", OBJECT_COLOUR, 0.5)
+    document.root.meshes.append(
+        gltf.Mesh(
+            name="sphere",
+            primitives=[gltf.Primitive(attributes=attributes, indices=indices, material=material)],
+        )
+    )
+    radii = recording.settings.get("object_radius", {})
+    for o, name in enumerate(recording.objects):
+        radius = float(radii.get(name, OBJECT_RADIUS))
+        node = document.add_node(
+            gltf.Node(
+                name=name,
+                mesh=len(document.root.meshes) - 1,
+                translation=[float(x) for x in recording.object_position[0, o]],
+                scale=[radius] * 3,
+            ),
+            top=True,
+        )
+        document.animate(node, "translation", times, recording.object_position[:, o], gltf.VEC3)
+
+
+def _sphere(rings: int = 12, sectors: int = 20) -> tuple[np.ndarray, np.ndarray]:
+    """A unit sphere: vertices (and normals) [V, 3] float32, faces [P, 3] uint16."""
+    polar = np.linspace(0, np.pi, rings + 1)[1:-1, None]
+    around = np.linspace(0, 2 * np.pi, sectors, endpoint=False)[None]
+    ring = np.stack(
+        [
+            np.sin(polar) * np.cos(around),
+            np.broadcast_to(np.cos(polar), (rings - 1, sectors)),
+            -np.sin(polar) * np.sin(around),
+        ],
+        axis=-1,
+    ).reshape(-1, 3)
+    vertices = np.concatenate([[[0, 1, 0]], ring, [[0, -1, 0]]])
+    vertices /= np.linalg.norm(vertices, axis=1, keepdims=True)
+    faces = []
+    for s in range(sectors):
+        t = (s + 1) % sectors
+        faces.append((0, 1 + s, 1 + t))
+        for r in range(rings - 2):
+            a, b = 1 + r * sectors, 1 + (r + 1) * sectors
+            faces += [(a + s, b + s, b + t), (a + s, b + t, a + t)]
+        last = 1 + (rings - 2) * sectors
+        faces.append((len(vertices) - 1, last + t, last + s))
+    return vertices.astype(np.float32), np.array(faces, dtype=np.uint16)
+
+
+def _to_linear(c: float) -> float:
+    """sRGB to linear light."""
+    return c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4
