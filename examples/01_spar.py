@@ -1,8 +1,7 @@
 """Two boxers of the built-in performer spar for ten seconds; the fight leaves as GLB."""
 
-from kumite.export.gltf import write_glb
-
 from kumite import LiveScene, builtin_library, load_scene, measure, record
+from kumite.export.gltf import write_glb
 
 library = builtin_library(None)
 print(f"{library.table.states} states, {library.table.actions} actions")

@@ -18,7 +18,7 @@ class Temper:
     """How a fighter chooses. All of it may be changed while the scene runs."""
 
     approach: float = 1.0  # weight of bringing blows' reach over the target
-    strike: float = 2.5  # weight of hitting it
+    strike: float = 3.5  # weight of hitting it
     facing: float = 4.0  # weight of looking at it meanwhile
     few: int = 3  # how many of the best actions are drawn from
     slack: float = 0.1  # an action is among the best if worth at least (1 - slack) × the best one's

@@ -62,20 +62,18 @@ class Camera:
         """Directions [H, W, 3] through the pixels, one metre towards the point looked at."""
         x = (np.arange(self.width) + 0.5 - 0.5 * self.width) / self.focal
         y = (0.5 * self.height - np.arange(self.height) - 0.5) / self.focal
-        return (
-            x[None, :, None] * self.axes[0] + y[:, None, None] * self.axes[1] - self.axes[2]
-        )
+        return x[None, :, None] * self.axes[0] + y[:, None, None] * self.axes[1] - self.axes[2]
 
 
-def look(target: np.ndarray, yaw: float, pitch: float, span: float, size: tuple[int, int]) -> Camera:
+def look(
+    target: np.ndarray, yaw: float, pitch: float, span: float, size: tuple[int, int]
+) -> Camera:
     """A camera that sees ``span`` metres from top to bottom at the target.
 
     ``yaw``: the side of the target it stands on (0: +Z), ``pitch``: how high, both in radians.
     """
     width, height = size
-    back = np.array(
-        [np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)]
-    )
+    back = np.array([np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)])
     right = np.array([np.cos(yaw), 0.0, -np.sin(yaw)])
     axes = np.stack([right, np.cross(back, right), back])
     return Camera(target + LENS * span * back, axes, LENS * height, width, height)

@@ -145,7 +145,8 @@ def pose(targets: Targets) -> tuple[np.ndarray, np.ndarray]:
         local[:, joint[f"{side}Shoulder"]] = clavicle
         clavicle = multiply(chest, clavicle)
         shoulder = collar + rotate(clavicle, offset[joint[f"{side}Arm"]])
-        hang = np.array([0.25 * sign, -1.0, -0.15])
+        # Down, a little out, and ahead: a fist at the chin has its elbow before the ribs.
+        hang = np.array([0.3 * sign, -1.0, 0.5])
         out = np.array([1.0 * sign, 0.05, -0.35])
         e = targets.elbow[:, s : s + 1]
         pole = rotate(chest, (1 - e) * hang + e * out)

@@ -74,7 +74,7 @@ FEET: Mapping[str, Vector] = {  # the ball of each foot and its yaw, in the stan
     "right": (-0.14, -0.22, -58.0),
 }
 
-_LEAD = (Step("left", 0.04, 0.25),)
+_LEAD = (Step("left", 0.04, 0.25), Step("right", 0.50, 0.70, 0.055))  # the rear foot follows
 _FORWARD = (Step("left", 0.05, 0.30), Step("right", 0.30, 0.52, 0.06))
 _BACK = (Step("right", 0.05, 0.28, 0.07), Step("left", 0.26, 0.50))
 _LEFTWARD = (Step("left", 0.05, 0.29), Step("right", 0.31, 0.53, 0.06))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from kumite.clip import SIDES, Clip, forward_kinematics, tip_positions
 from kumite.errors import KumiteError, unknown
@@ -30,6 +30,7 @@ FPS = 60.0
 SETTLE = 0.10  # s of guard between two moves
 LEAD_IN = 0.5  # s of guard before the first and after the last
 SMOOTHING = 0.022  # s, rounds off what keys leave of corners
+SINK = 9  # frames before and after which the pelvis gives way to legs that would not reach
 SWAY = 0.008  # m of bounce
 
 
@@ -165,9 +166,10 @@ def perform_take(
         feet[:, :, :3],
         foot_turn,
     )
-    height = gaussian_filter1d(lowered(targets), 0.03 * FPS, mode="nearest")
     pelvis = targets.pelvis.copy()
-    pelvis[:, 1] = np.minimum(height, lowered(targets))
+    # Lowest within the filter's width, then smoothed: smooth, and nowhere above what legs reach.
+    low = minimum_filter1d(lowered(targets), 2 * SINK + 1, mode="nearest")
+    pelvis[:, 1] = gaussian_filter1d(low, SINK / 3.0, mode="nearest", radius=SINK)
     root, wxyz = pose(replace(targets, pelvis=pelvis))
     clip = Clip(name, skeleton(), FPS, root, wxyz)
     truth = Truth(on_ground, _strikes(clip, score, starts), _actions(score, starts))
