@@ -126,7 +126,7 @@ def test_fists_are_as_fast_as_fists(performance: Performance, worlds):
 
 
 def test_elbows_and_knees_bend_one_way(performance: Performance, worlds):
-    for (position, world), clip in zip(worlds, performance.clips):
+    for (position, _), clip in zip(worlds, performance.clips):
         s = clip.skeleton
         for side in SIDES:
             for upper, middle, end in (

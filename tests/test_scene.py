@@ -60,7 +60,10 @@ def test_swept_contact_equals_brute_force(seed):
         assert min(gaps) > -0.05 * (min(ra, rb) + r)
     else:
         travel = np.linalg.norm(p1 - p0) + max(np.linalg.norm(a1 - a0), np.linalg.norm(b1 - b0))
-        assert 0 <= (t - expected) * travel <= 0.3 * (min(ra, rb) + r) + 1e-6
+        # The first step that touches is closed in on; a graze before it may be missed.
+        relative = max(np.linalg.norm((p1 - p0) - (a1 - a0)), np.linalg.norm((p1 - p0) - (b1 - b0)))
+        assert (t - expected) * relative <= 0.5 * (min(ra, rb) + r)
+        assert (expected - t) * travel <= 1e-2
 
 
 @pytest.mark.parametrize("speed", [1.0, 5.0, 20.0, 100.0, 1000.0])
@@ -152,7 +155,7 @@ def test_two_boxers_fight(fight: Recording):
     for c in m.characters:
         assert c.thrown >= c.landed >= 1
         assert c.facing_share is not None and c.facing_share > 0.6
-        assert c.skate_ratio is not None and c.skate_ratio < 1.5
+        assert c.skate_m_s < 0.02  # the performer's own feet do not move at all
         assert c.join_jump_m_s < 0.6
         assert c.variety > 0.2
 
@@ -208,10 +211,10 @@ def test_decisions_are_logged_with_what_was_considered(fight: Recording):
 
 def test_a_boxer_goes_for_the_target_wherever_it_is_put(library: Library):
     scene = LiveScene(load_scene("target"), library, seed=0)
-    for place in ([0.0, 1.5, 1.2], [-1.5, 1.45, -1.0]):
+    for place in ([0.0, 1.5, 1.2], [-1.5, 1.45, -1.0], [2.0, 1.5, -1.0]):
         scene.move_object("target", np.array(place))
         before = sum(e.kind == "hit" for e in scene.events)
-        for _ in range(int(15 * scene.fps)):
+        for _ in range(int(25 * scene.fps)):
             scene.step()
         gap = np.hypot(*(scene.root_position[0, [0, 2]] - np.array(place)[[0, 2]]))
         assert gap < 1.3, place

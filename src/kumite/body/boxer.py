@@ -368,7 +368,9 @@ def _hair(m: Modeller, table: np.ndarray, skull: np.ndarray, tall: np.ndarray, h
     segments = 28
     angle = 2 * np.pi * np.arange(segments) / segments
     ahead = np.sin(angle)
-    line = np.where(ahead > 0, 0.56 + 0.24 * ahead**0.7, 0.56 - 0.30 * np.abs(ahead) ** 1.5)
+    line = np.where(
+        ahead > 0, 0.56 + 0.24 * np.abs(ahead) ** 0.7, 0.56 - 0.30 * np.abs(ahead) ** 1.5
+    )
     rings = 9
     fraction = np.linspace(0.0, 1.0, rings)[:, None]
     way = line + (1.0 - line) * np.sin(0.5 * np.pi * fraction)

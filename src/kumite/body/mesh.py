@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,7 +49,7 @@ class BodyMesh:
     def __len__(self) -> int:
         return len(self.vertices)
 
-    def colours(self, palette: dict[str, tuple[float, float, float]]) -> np.ndarray:
+    def colours(self, palette: Mapping[str, tuple[float, float, float]]) -> np.ndarray:
         """Colours [V, 3] from a palette that gives every role one (0..1)."""
         return np.array([palette[r] for r in ROLES], dtype=np.float32)[self.role]
 

@@ -23,7 +23,7 @@ class Surface:
     weights: np.ndarray  # [V, J], rows sum to 1
 
 
-def profile(rows: Sequence[Sequence[float]], rings: int) -> np.ndarray:
+def profile(rows: Sequence[Sequence[float]] | np.ndarray, rings: int) -> np.ndarray:
     """Rings [R, 5] through a table of key rings, without overshoot, denser where they are denser.
 
     ``rows`` are (at, sides, front, back[, ahead]); a missing last column is 0.

@@ -18,11 +18,11 @@ class Temper:
     """How a fighter chooses. All of it may be changed while the scene runs."""
 
     approach: float = 1.0  # weight of bringing blows' reach over the target
-    strike: float = 3.5  # weight of hitting it
-    facing: float = 4.0  # weight of looking at it meanwhile
+    strike: float = 6.0  # weight of hitting it
+    facing: float = 3.0  # how much turning away from it meanwhile cuts an action's worth
     few: int = 3  # how many of the best actions are drawn from
-    slack: float = 0.1  # an action is among the best if worth at least (1 - slack) × the best one's
-    boredom: float = 0.5  # how much an action's worth is cut down while it was used recently
+    slack: float = 0.2  # how much less an action may gain than the best one, as a share of that
+    boredom: float = 0.5  # how much of its gain an action loses while it was used recently
     memory: int = 6  # how many actions back "recently" goes
     personal_space: float = 0.65  # m between the bodies that an action must leave
 
@@ -78,8 +78,10 @@ class Fighter:
         gap = np.empty(len(worth))
         fps = skill.library.clips.fps
         near, hit = skill.approach, skill.strike
+        goal = _within(target, near.behaviour.grid.high[1])
         kernels.look_ahead(
             state,
+            goal,
             target,
             other,
             table.action_start,
@@ -113,12 +115,30 @@ class Fighter:
         # Where every action would come too near, those that stay farthest off.
         allowed = apart if apart.any() else gap >= gap.max() - 0.02
         recent = np.isin(stretch, np.fromiter(self._recent, np.int64, len(self._recent)))
-        value = np.where(recent, (1.0 - temper.boredom) * worth, worth)
-        value[~allowed] = -np.inf
-        order = np.argsort(-value, kind="stable")[: temper.few]
-        best = order[value[order] >= (1.0 - temper.slack) * value[order[0]]]
+        # What counts is how much better an action is than the usual one: far from the target all
+        # are worth nearly the same, and still one of them leads there.
+        gain = worth - np.median(worth[allowed])
+        gain -= np.where(recent, temper.boredom * np.abs(gain), 0.0)
+        gain[~allowed] = -np.inf
+        order = np.argsort(-gain, kind="stable")[: temper.few]
+        best = order[gain[order] >= (1.0 - temper.slack) * gain[order[0]]]
+        if len(best) == 0:  # all are worth less than the median after boredom
+            best = order[:1]
         pick = int(best[self.rng.integers(len(best))])
         self._recent.append(int(stretch[pick]))
         while len(self._recent) > temper.memory:
             self._recent.popleft()
         return Choice(int(stretch[pick]), float(worth[pick]), len(worth), int(apart.sum()))
+
+
+def _within(target: np.ndarray, radius: float) -> np.ndarray:
+    """A target's places [H, 3], moved so that the first lies within ``radius`` of the avatar.
+
+    A target out of the grid is approached as if it stood on its rim: each action brings it nearer.
+    (Were the place after the action clamped instead, no way of getting there would be better than
+    another.)
+    """
+    away = float(np.hypot(target[0, 0], target[0, 2]))
+    if away <= radius:
+        return target
+    return target - (1.0 - radius / away) * np.array([target[0, 0], 0.0, target[0, 2]])

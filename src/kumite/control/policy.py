@@ -30,7 +30,8 @@ DISCOUNT_PER_SECOND = 0.97**15  # the paper's 0.97 a frame at 15 frames a second
 class Tracks:
     """What the stretches do, seen from where they begin (the facing frame of first - 1)."""
 
-    centre: np.ndarray  # [L's frames, 2] m, ground track of the centroid of the hitting points
+    centre: np.ndarray  # [L's frames, 2] m, ground track of the centroid of the hitting points:
+    # of each blow the fist's front where it is fastest
     centre_start: np.ndarray  # [L + 1]
     root: np.ndarray  # [L's frames, 3] (x, z, yaw) of the facing frame
     tip: np.ndarray  # [effective frames, 3] m
@@ -44,9 +45,10 @@ def stretch_tracks(library: Library, limbs: tuple[str, ...] = LIMBS) -> Tracks:
     table, strikes, facing = library.table, library.strikes, library.clips.facing
     use = [LIMBS.index(limb) for limb in limbs]
     effective = strikes.effective[:, use]
-    points = strikes.tip[:, use][effective]
-    ahead = points.mean(axis=0) if len(points) else np.array([0.0, 0.0, 0.8])
-    fastest = strikes.speed[:, use][effective].max() if len(points) else 1.0
+    mine = np.isin(strikes.limb, use)
+    points = strikes.tip[strikes.frame[mine], strikes.limb[mine]]
+    ahead = points.mean(axis=0) if len(points) else np.array([0.0, 0.0, 0.6])
+    fastest = strikes.speed[:, use][effective].max() if effective.any() else 1.0
 
     length = table.duration
     start = np.concatenate([[0], np.cumsum(length)])

@@ -281,20 +281,20 @@ def recording_sheet(
     follow: bool = True,
 ) -> None:
     """Draw frames of a recording (twelve at even distances unless given), labelled in seconds."""
-    if frames is None:
-        frames = np.unique(np.linspace(0, len(recording) - 1, 12).round().astype(int)).tolist()
+    evenly = np.unique(np.linspace(0, len(recording) - 1, 12).round().astype(int))
+    chosen = evenly.tolist() if frames is None else list(frames)
     radii = recording.settings.get("object_radius", {})
     contact_sheet(
         path,
         recording.skeleton,
         recording.root_position,
         recording.wxyz,
-        frames,
+        chosen,
         columns=columns,
         view=view,
         colours=colours,
         size=size,
-        labels=[f"{f / recording.fps:.2f} s" for f in frames],
+        labels=[f"{f / recording.fps:.2f} s" for f in chosen],
         follow=follow,
         object_position=recording.object_position,
         object_radius=[float(radii.get(n, OBJECT_RADIUS)) for n in recording.objects],

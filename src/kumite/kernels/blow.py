@@ -13,6 +13,7 @@ from kumite.kernels.pose import add_rotated
 NO_HIT = -1
 NO_BLOW = -1
 NOBODY = -1
+REFINEMENTS = 8  # halvings of the step in which contact begins
 
 
 @kernel
@@ -30,11 +31,21 @@ def capsule_gap(p, a, b, radius_a, radius_b):
 
 
 @kernel
+def touches(t, p0, p1, a0, a1, b0, b1, radius_a, radius_b, radius, p, a, b):
+    """Whether the moving sphere meets the moving capsule at time t (0..1); p, a, b are scratch."""
+    for c in range(3):
+        p[c] = p0[c] + t * (p1[c] - p0[c])
+        a[c] = a0[c] + t * (a1[c] - a0[c])
+        b[c] = b0[c] + t * (b1[c] - b0[c])
+    return capsule_gap(p, a, b, radius_a, radius_b) <= radius
+
+
+@kernel
 def swept_contact(p0, p1, a0, a1, b0, b1, radius_a, radius_b, radius):
     """First time 0..1 at which a moving sphere touches a moving tapered capsule, or -1.
 
     Both move in straight lines between two frames; steps are a quarter of the thinnest radius, so
-    that nothing can pass through between two of them.
+    that nothing can pass through between two of them; the first contact is then closed in on.
     """
     travel = 0.0
     for c in range(3):
@@ -43,14 +54,20 @@ def swept_contact(p0, p1, a0, a1, b0, b1, radius_a, radius_b, radius):
     thin = 0.25 * (min(radius_a, radius_b) + radius)
     steps = int(np.ceil(np.sqrt(travel) / thin)) + 1
     p, a, b = np.empty(3), np.empty(3), np.empty(3)
+    apart, t = 0.0, 0.0
     for k in range(steps + 1):
         t = k / steps
-        for c in range(3):
-            p[c] = p0[c] + t * (p1[c] - p0[c])
-            a[c] = a0[c] + t * (a1[c] - a0[c])
-            b[c] = b0[c] + t * (b1[c] - b0[c])
-        if capsule_gap(p, a, b, radius_a, radius_b) <= radius:
+        if touches(t, p0, p1, a0, a1, b0, b1, radius_a, radius_b, radius, p, a, b):
+            if k == 0:
+                return 0.0
+            for _ in range(REFINEMENTS):
+                middle = 0.5 * (apart + t)
+                if touches(middle, p0, p1, a0, a1, b0, b1, radius_a, radius_b, radius, p, a, b):
+                    t = middle
+                else:
+                    apart = middle
             return t
+        apart = t
     return -1.0
 
 

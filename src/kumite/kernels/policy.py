@@ -16,6 +16,8 @@ from numba import prange
 
 from kumite.kernels.jit import kernel, parallel_kernel
 
+FACING_CONE = np.cos(np.radians(30.0))  # within it a target is faced; a boxer's hips are bladed
+
 
 @kernel
 def carry(displacement, x, z):
@@ -184,6 +186,7 @@ def best_actions(action_start, stretch, q, value, change):
 @kernel
 def look_ahead(
     state,
+    goal,
     target,
     other,
     action_start,
@@ -208,18 +211,19 @@ def look_ahead(
     strike_grid,
     weight_strike,
     root,
-    weight_facing,
+    facing,
     worth,
     gap,
 ):
     """One step of Eq. 4 at run time, exact in the continuous target, for every action of a state.
 
     target [H, 3]: where the target is expected at frames 1.. after the decision, seen from the
-    avatar's facing frame; the last row holds from then on. other [H, 2]: the same for the body that
+    avatar's facing frame; the last row holds from then on. goal [H, 3]: the same for approaching,
+    brought within the reach of its grid. other [H, 2]: the same for the body that
     must not be run into. track, tip, root: what the stretches do (root [., 3] is (x, z, yaw) of the
     facing frame and shares track_start). A grid is (low, step, size, wraps, inside_only). Fills
-    worth [n] with the weighted values, with weight_facing times the mean cosine of the angle to the
-    target, and gap [n] with the smallest distance kept to the other body.
+    worth [n] with the weighted values, cut down by exp(-facing) for each unit by which the target is
+    out of a cone ahead (in cosine, mean over the action), and gap [n] with the smallest distance kept to the other body.
     """
     index = np.zeros(8, dtype=np.int64)
     weight = np.zeros(8)
@@ -230,22 +234,21 @@ def look_ahead(
         k = stretch[a]
         first, last = track_start[k], track_start[k + 1]
         end = min(duration[k], horizon + 1) - 1
-        x, z = carry(displacement[k], target[end, 0], target[end, 2])
-        y = target[end, 1]
         worth[n] = 0.0
         if weight_approach != 0.0:
+            x, z = carry(displacement[k], goal[end, 0], goal[end, 2])
             best, factor = 0.0, 1.0
             for t in range(last - first):
                 factor *= discount_approach
                 if factor <= best:
                     break
                 h = min(t, horizon)
-                d = np.hypot(track[first + t, 0] - target[h, 0], track[first + t, 1] - target[h, 2])
+                d = np.hypot(track[first + t, 0] - goal[h, 0], track[first + t, 1] - goal[h, 2])
                 best = max(best, factor * np.exp(-d / sigma))
             later = interpolate(
                 approach_value[successor[k]],
                 x,
-                y,
+                0.0,
                 z,
                 low_a,
                 step_a,
@@ -257,6 +260,8 @@ def look_ahead(
             )
             worth[n] += weight_approach * (best + discount_approach ** duration[k] * later)
         if weight_strike != 0.0:
+            x, z = carry(displacement[k], target[end, 0], target[end, 2])
+            y = target[end, 1]
             best = 0.0
             for p in range(tip_start[k], tip_start[k + 1]):
                 h = min(tip_when[p] - 1, horizon)
@@ -280,14 +285,15 @@ def look_ahead(
             )
             worth[n] += weight_strike * (best + discount_strike ** duration[k] * later)
         nearest = np.inf
-        towards = 0.0
+        astray = 0.0
         for t in range(last - first):
             h = min(t, horizon)
             x = target[h, 0] - root[first + t, 0]
             z = target[h, 2] - root[first + t, 1]
             yaw = root[first + t, 2]
-            towards += (x * np.sin(yaw) + z * np.cos(yaw)) / (np.hypot(x, z) + 1e-9)
+            cosine = (x * np.sin(yaw) + z * np.cos(yaw)) / (np.hypot(x, z) + 1e-9)
+            astray += max(0.0, FACING_CONE - cosine)
             d = np.hypot(root[first + t, 0] - other[h, 0], root[first + t, 1] - other[h, 1])
             nearest = min(nearest, d)
-        worth[n] += weight_facing * towards / (last - first)
+        worth[n] *= np.exp(-facing * astray / (last - first))
         gap[n] = nearest

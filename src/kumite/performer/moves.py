@@ -265,7 +265,7 @@ MOVES: tuple[Move, ...] = (
 )  # fmt: skip
 
 # How far a blow's target and travel may be varied: what a shadow boxer does from one to the next.
-BLOW_ANGLE = 24.0  # deg to either side
+BLOW_ANGLE = 16.0  # deg to either side
 BLOW_REACH = (-0.10, 0.06)  # m nearer and farther
 BLOW_HEIGHT = (-0.12, 0.07)  # m lower and higher
 TRAVEL = 0.5  # share by which steps and turns are varied

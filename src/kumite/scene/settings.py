@@ -26,8 +26,8 @@ class CharacterSettings(_Settings):
     yaw_deg: Finite = 0.0  # 0 faces +Z
     aims_at: Name  # a character (its head) or an object
     approach: Annotated[Finite, Field(ge=0)] = 1.0  # weights of the behaviours
-    strike: Annotated[Finite, Field(ge=0)] = 3.5
-    facing: Annotated[Finite, Field(ge=0)] = 4.0
+    strike: Annotated[Finite, Field(ge=0)] = 6.0
+    facing: Annotated[Finite, Field(ge=0)] = 3.0
     few: Annotated[int, Field(ge=1, le=50)] = 3  # drawn from the best few actions
     personal_space: Annotated[Finite, Field(ge=0, le=3)] = 0.65  # m kept to the other's body
 
