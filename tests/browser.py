@@ -101,6 +101,13 @@ def wait_until(page: Page, condition: Callable[[], bool], what: str, seconds: fl
         page.wait_for_timeout(100)
 
 
+def close_notes(page: Page) -> None:
+    """Close what the viewer says of the browser (it has no graphics card), which hides the scene."""
+    for button in page.locator(".mantine-Notification-closeButton").all():
+        button.click()
+    page.wait_for_timeout(400)
+
+
 def picture(page: Page) -> np.ndarray:
     """The page as it is seen now [H, W, 3] uint8."""
     return np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB"))
@@ -113,6 +120,7 @@ def save_picture(
     with open_page(url, size) as (page, _):
         page.wait_for_selector("canvas")
         page.wait_for_timeout(wait * 1000)
+        close_notes(page)
         path.parent.mkdir(parents=True, exist_ok=True)
         page.screenshot(path=str(path))
 

@@ -51,10 +51,11 @@ class _Document:
     """A glTF document and its one buffer, filled from the front."""
 
     def __init__(self, title: str) -> None:
+        self._top: list[int] = []
         self.root = gltf.GLTF2(
             asset=gltf.Asset(version="2.0", generator=GENERATOR),
             scene=0,
-            scenes=[gltf.Scene(name=title, nodes=[])],
+            scenes=[gltf.Scene(name=title, nodes=self._top)],
         )
         self.animation = gltf.Animation(name=title, channels=[], samplers=[])
         self._parts: list[bytes] = []
@@ -95,7 +96,7 @@ class _Document:
         self.root.nodes.append(node)
         index = len(self.root.nodes) - 1
         if top:
-            self.root.scenes[0].nodes.append(index)
+            self._top.append(index)
         return index
 
     def add_material(self, name: str, colour: tuple[float, float, float], rough: float) -> int:

@@ -219,11 +219,12 @@ def look_ahead(
 
     target [H, 3]: where the target is expected at frames 1.. after the decision, seen from the
     avatar's facing frame; the last row holds from then on. goal [H, 3]: the same for approaching,
-    brought within the reach of its grid. other [H, 2]: the same for the body that
-    must not be run into. track, tip, root: what the stretches do (root [., 3] is (x, z, yaw) of the
-    facing frame and shares track_start). A grid is (low, step, size, wraps, inside_only). Fills
-    worth [n] with the weighted values, cut down by exp(-facing) for each unit by which the target is
-    out of a cone ahead (in cosine, mean over the action), and gap [n] with the smallest distance kept to the other body.
+    brought within the reach of its grid. other [H, 2]: the same for the body that must not be run
+    into. track, tip, root: what the stretches do (root [., 3] is (x, z, yaw) of the facing frame
+    and shares track_start). A grid is (low, step, size, wraps, inside_only). Fills worth [n] with
+    the weighted values, cut down by exp(-facing) for each unit by which the target is out of a cone
+    ahead (in cosine, mean over the action), and gap [n] with the smallest distance kept to the
+    other body.
     """
     index = np.zeros(8, dtype=np.int64)
     weight = np.zeros(8)

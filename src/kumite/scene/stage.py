@@ -23,18 +23,39 @@ class SceneObject:
 
 
 class Stage(Protocol):
-    """A scene that moves on one frame at a time."""
+    """A scene that moves on one frame at a time. K characters; what is shown is read only."""
 
-    title: str
-    fps: float
-    skeleton: Skeleton
-    names: tuple[str, ...]  # K
-    seed: int
-    frame: int  # frames since the start
-    root_position: np.ndarray  # [K, 3] m, now
-    wxyz: np.ndarray  # [K, J, 4], now
-    objects: Sequence[SceneObject]
-    events: Sequence[Event]  # everything so far, oldest first
+    @property
+    def title(self) -> str: ...
+    @property
+    def fps(self) -> float: ...
+    @property
+    def skeleton(self) -> Skeleton: ...
+    @property
+    def names(self) -> tuple[str, ...]: ...
+    @property
+    def seed(self) -> int: ...
+    @property
+    def frame(self) -> int:
+        """Frames since the start."""
+        ...
+
+    @property
+    def root_position(self) -> np.ndarray:
+        """[K, 3] m, now."""
+        ...
+
+    @property
+    def wxyz(self) -> np.ndarray:
+        """[K, J, 4], now."""
+        ...
+
+    @property
+    def objects(self) -> Sequence[SceneObject]: ...
+    @property
+    def events(self) -> Sequence[Event]:
+        """Everything so far, oldest first."""
+        ...
 
     def step(self) -> bool:
         """Move on one frame; False when there is no next one."""

@@ -61,16 +61,12 @@ class Targets:
             position=thing.position,
         )
 
-        @gizmo.on_drag_start
-        def _(_: viser.TransformControlsEvent) -> None:
-            self._held.add(index)
-
-        @gizmo.on_drag_end
-        def _(_: viser.TransformControlsEvent) -> None:
-            self._held.discard(index)
-
         @gizmo.on_update
         def _(event: viser.TransformControlsEvent) -> None:
+            if event.phase == "start":
+                self._held.add(index)
+            elif event.phase == "end":
+                self._held.discard(index)
             moved(thing.name, np.array(event.target.position, dtype=np.float64))
 
         return gizmo

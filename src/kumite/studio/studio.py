@@ -193,6 +193,11 @@ class Studio:
 
     # The loop; one thread.
 
+    def seen_at(self, point: np.ndarray) -> np.ndarray:
+        """Where a point [3] m of the stage lies in the page's world, which follows the fighters."""
+        x, z = self._follow.centre
+        return np.asarray(point, dtype=np.float64) - np.array([x, 0.0, z])
+
     def run(self, seconds: float | None = None) -> None:
         """Play until :meth:`stop`, or for ``seconds`` of wall time."""
         end = None if seconds is None else time.perf_counter() + seconds

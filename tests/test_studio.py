@@ -1,0 +1,215 @@
+"""The studio: what it listens on, how it keeps time, and what a browser sees of it."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import psutil
+import pytest
+
+from kumite.clip import forward_kinematics
+from kumite.errors import KumiteError
+from kumite.graph import Library
+from kumite.scene import LiveScene, Playback, load_scene, record
+from kumite.studio import Studio, serve
+from kumite.studio.pace import Pace
+from tests import browser
+
+
+@contextmanager
+def running(studio: Studio) -> Iterator[Studio]:
+    thread = threading.Thread(target=studio.run, daemon=True)
+    thread.start()
+    try:
+        yield studio
+    finally:
+        studio.stop()
+        thread.join(10)
+        studio.close()
+        assert not thread.is_alive()
+
+
+def wait(condition, seconds: float = 20.0) -> bool:
+    end = time.perf_counter() + seconds
+    while not condition():
+        if time.perf_counter() > end:
+            return False
+        time.sleep(0.02)
+    return True
+
+
+def live(library: Library, scene: str, seed: int = 1) -> LiveScene:
+    return LiveScene(load_scene(scene), library, seed=seed)
+
+
+def test_nothing_listens_beyond_this_machine(library: Library):
+    with running(Studio(live(library, "sparring"), port=0)):
+        mine = psutil.Process().net_connections(kind="inet")
+        listening = {c.laddr.ip for c in mine if c.status == psutil.CONN_LISTEN}
+        assert listening == {"127.0.0.1"}
+
+
+def test_it_ends_by_itself_and_says_where_it_is(library: Library):
+    said: list[str] = []
+    serve(live(library, "sparring"), port=0, open_browser=False, seconds=1.0, announce=said.append)
+    assert any("http://127.0.0.1:" in line for line in said)
+
+
+def test_a_taken_port_moves_on_or_is_an_error(library: Library):
+    stage = live(library, "sparring")
+    with running(Studio(stage, port=0)) as first:
+        port = first.server.get_port()
+        said: list[str] = []
+        serve(stage, port=port, open_browser=False, seconds=0.2, announce=said.append)
+        assert any(f"port {port} is taken" in line for line in said)
+        with pytest.raises(KumiteError, match=str(port)):
+            serve(stage, port=port, strict_port=True, open_browser=False, seconds=0.2)
+
+
+def test_a_host_that_is_not_ours_is_refused(library: Library):
+    with pytest.raises(KumiteError):
+        Studio(live(library, "sparring"), host="203.0.113.1", port=0)
+
+
+def test_it_keeps_time_pauses_steps_and_restarts(library: Library):
+    stage = live(library, "sparring")
+    with running(Studio(stage, port=0)) as studio:
+        begin, frame = time.perf_counter(), stage.frame
+        time.sleep(2.0)
+        rate = (stage.frame - frame) / (time.perf_counter() - begin)
+        assert rate == pytest.approx(stage.fps, rel=0.25)
+        studio.set_speed(2.0)
+        begin, frame = time.perf_counter(), stage.frame
+        time.sleep(1.5)
+        assert (stage.frame - frame) / (time.perf_counter() - begin) > 1.5 * stage.fps
+        studio.toggle()
+        time.sleep(0.3)
+        at = stage.frame
+        time.sleep(0.3)
+        assert stage.frame == at and not studio.playing
+        studio.step_once()
+        assert wait(lambda: stage.frame == at + 1)
+        studio.restart(9)
+        assert wait(lambda: stage.seed == 9 and stage.frame < at)
+
+
+def test_time_that_was_missed_is_not_made_up_for_ever():
+    pace = Pace(30.0)
+    pace.restart()
+    time.sleep(0.5)
+    assert pace.take() <= 30
+
+
+def test_a_recording_plays_to_its_end_and_can_be_sought(library: Library):
+    play = Playback(record(live(library, "sparring"), 1.0))
+    with running(Studio(play, port=0)) as studio:
+        assert wait(lambda: play.frame == len(play.recording) - 1)
+        studio.seek(5)
+        assert play.frame == 5
+
+
+@pytest.fixture(scope="module", autouse=False)
+def chromium() -> None:
+    browser.need_chromium()
+
+
+def _look_side_on(client, studio: Studio) -> None:
+    """Put the camera where neither fighter hides the other."""
+    a, b = (studio.seen_at(r) for r in studio.stage.root_position)
+    along = (b - a) / np.linalg.norm(b - a)
+    across = np.array([along[2], 0.0, -along[0]])
+    middle = 0.5 * (a + b)
+    client.camera.position = middle + 3.5 * across + np.array([0.0, 0.4, 0.0])
+    client.camera.look_at = middle
+
+
+@pytest.mark.slow
+def test_both_bodies_are_seen_to_move(library: Library, chromium):
+    stage = live(library, "sparring")
+    with running(Studio(stage, port=0)) as studio, browser.open_page(studio.url) as (page, traffic):
+        client = browser.client_of(studio.server, page)
+        page.wait_for_selector("canvas")
+        places: list = []
+
+        def differs() -> bool:
+            """Around both pelvises, where they were and are, the picture has changed."""
+            before, roots = browser.picture(page), stage.root_position.copy()
+            page.wait_for_timeout(700)
+            after = browser.picture(page)
+            places[:] = [browser.project(studio.seen_at(r), client.camera, page) for r in roots]
+            changed = [
+                np.abs(
+                    browser.around(after, p, 40).astype(int)
+                    - browser.around(before, p, 40).astype(int)
+                ).mean()
+                for p in places
+            ]
+            return min(changed) > 2.0
+
+        browser.wait_until(page, differs, "both bodies to move", 60)
+        # The red corner is red, the blue one blue, where the server says that they are.
+        studio.set_follow(False)
+        studio.toggle()
+        _look_side_on(client, studio)
+        page.wait_for_timeout(1500)
+        position, _ = forward_kinematics(stage.skeleton, stage.root_position, stage.wxyz)
+        image = browser.picture(page).astype(int)
+        shares = []
+        for k in range(2):
+            chest = position[k, stage.skeleton.joint("chest")]
+            patch = browser.around(
+                image, browser.project(studio.seen_at(chest), client.camera, page), 45
+            )
+            warm = patch[..., 0] - patch[..., 2]
+            shares.append(((warm > 40).mean(), (warm < -40).mean()))
+        (red_in_red, blue_in_red), (red_in_blue, blue_in_blue) = shares
+        assert red_in_red > 0.3 and blue_in_blue > 0.2, shares
+        assert red_in_red > red_in_blue and blue_in_blue > blue_in_red, shares
+        assert traffic.hosts <= {"127.0.0.1", ""}
+        assert traffic.errors == []
+
+
+@pytest.mark.slow
+def test_the_target_is_dragged_and_the_boxer_goes_for_it(library: Library, chromium):
+    stage = live(library, "target", seed=0)
+    with running(Studio(stage, port=0)) as studio, browser.open_page(studio.url) as (page, traffic):
+        client = browser.client_of(studio.server, page)
+        page.wait_for_selector("canvas")
+        page.wait_for_timeout(1500)
+        studio.set_follow(False)
+        studio.toggle()  # hold still, so that the handle stays where it is aimed at
+        page.wait_for_timeout(800)
+        thing = stage.objects[0]
+        home = thing.position.copy()
+        moved = False
+        browser.close_notes(page)
+        # The gizmo's arrows reach out from the target along the axes: try each, near to far.
+        for axis, reach in itertools.product(np.eye(3)[[2, 0, 1]], (0.22, 0.25, 0.19, 0.16, 0.3)):
+            here = studio.seen_at(thing.position)
+            start = browser.project(here + reach * axis, client.camera, page)
+            end = browser.project(here + (reach + 0.9) * axis, client.camera, page)
+            browser.drag(page, start, end)
+            moved = bool(np.linalg.norm(stage._home[0] - home) > 0.2)
+            if moved:
+                break
+        assert moved, "no arrow of the gizmo could be dragged"
+        goal = stage._home[0].copy()
+        studio.set_speed(4.0)
+        studio.toggle()
+        reach = 1.1
+
+        def arrived() -> bool:
+            gap = stage.root_position[0, [0, 2]] - goal[[0, 2]]
+            return bool(np.hypot(*gap) < reach)
+
+        browser.wait_until(page, arrived, "the boxer to come to the target", 60)
+        hits = sum(e.kind == "hit" for e in stage.events)
+        browser.wait_until(
+            page, lambda: sum(e.kind == "hit" for e in stage.events) > hits, "a hit", 60
+        )
+        assert traffic.errors == []
