@@ -102,7 +102,7 @@ def wait_until(page: Page, condition: Callable[[], bool], what: str, seconds: fl
 
 
 def close_notes(page: Page) -> None:
-    """Close what the viewer says of the browser (it has no graphics card), which hides the scene."""
+    """Close what the viewer says of a browser without a graphics card: it hides the scene."""
     for button in page.locator(".mantine-Notification-closeButton").all():
         button.click()
     page.wait_for_timeout(400)

@@ -1,0 +1,93 @@
+"""The body laid on skeletons: capsules, masses and skin, on ours and on real ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kumite import body as bodies
+from kumite import mocap as mocap_files
+from kumite import performer
+from kumite.clip import Skeleton, forward_kinematics
+from kumite.errors import KumiteError
+from kumite.rotation import exp
+from tests import toys
+
+
+@pytest.fixture(params=["toy", "performer", "boxer", "cmu"])
+def skeleton(request) -> Skeleton:
+    if request.param == "toy":
+        return toys.skeleton()
+    if request.param == "performer":
+        return performer.skeleton()
+    mocap = request.getfixturevalue("mocap")
+    take = {"boxer": "boxer/uppercut_left.bvh", "cmu": "cmu/02/02_01.amc"}[request.param]
+    return mocap_files.load(mocap / take).clips[0].skeleton
+
+
+def test_every_part_lies_on_its_bone(skeleton: Skeleton):
+    body = bodies.lay_body(skeleton)
+    assert body.parts == bodies.PARTS
+    assert body.mass.sum() == pytest.approx(75.0)
+    for left in (p for p in body.parts if p.startswith("left_")):
+        a, b = body.part(left), body.part(left.replace("left_", "right_"))
+        assert body.mass[a] == pytest.approx(body.mass[b])
+        assert body.radius_start[a] == pytest.approx(body.radius_start[b])
+    for part in ("upper_arm", "forearm", "thigh", "shin"):
+        k = body.part(f"left_{part}")
+        assert body.joint[k] == skeleton.joint(f"left_{part}")
+        assert np.allclose(body.start[k], 0, atol=1e-6)
+    head = body.part("head")
+    assert body.joint[head] == skeleton.joint("head")
+    assert 0.06 < body.radius_start[head] < 0.12
+
+
+def test_the_skin_is_closed_weighted_and_man_sized(skeleton: Skeleton):
+    mesh = bodies.body_mesh(skeleton)
+    assert 1000 < len(mesh) < 12_000
+    assert np.allclose(mesh.weights.sum(axis=1), 1, atol=1e-6)
+    assert mesh.joints.max() < len(skeleton) and mesh.faces.max() < len(mesh)
+    assert np.allclose(np.linalg.norm(mesh.normals, axis=1), 1, atol=1e-4)
+    assert set(np.unique(mesh.role)) == set(range(len(bodies.ROLES)))
+    assert np.all(np.diff(mesh.role.astype(int)) >= 0)
+    # Every edge of a closed surface is shared by two faces, once in each direction.
+    edges = np.concatenate([mesh.faces[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))])
+    forward = {tuple(e) for e in edges.tolist()}
+    assert len(forward) == len(edges)
+    open_edges = sum((b, a) not in forward for a, b in forward)
+    assert open_edges < 0.1 * len(forward)  # cuffs, collars and the like may be open
+
+
+def test_rest_pose_skinning_changes_nothing_and_skin_follows_bones(skeleton: Skeleton):
+    mesh = bodies.body_mesh(skeleton)
+    identity = np.zeros((1, len(skeleton), 4))
+    identity[..., 0] = 1
+    position, world = forward_kinematics(skeleton, np.zeros((1, 3)), identity)
+    vertices, _ = bodies.skin_vertices(mesh, skeleton, position[0], world[0])
+    assert np.allclose(vertices, mesh.vertices, atol=1e-5)
+    turned = exp(np.random.default_rng(0).normal(0, 0.2, (1, len(skeleton), 3)))
+    position, world = forward_kinematics(skeleton, np.ones((1, 3)), turned)
+    vertices, normals = bodies.skin_vertices(mesh, skeleton, position[0], world[0])
+    assert np.allclose(np.linalg.norm(normals, axis=1), 1)
+    # Nobody's skin is far from the bones that carry it.
+    carrier = position[0][mesh.joints[:, 0]]
+    assert np.linalg.norm(vertices - carrier, axis=1).max() < 0.75
+
+
+def test_palettes_colour_every_role():
+    mesh = bodies.body_mesh(toys.skeleton())
+    for k in range(8):
+        colours = mesh.colours(bodies.palette(k))
+        assert colours.shape == (len(mesh), 3) and 0 <= colours.min() and colours.max() <= 1
+    assert bodies.palette(0) != bodies.palette(1)
+
+
+def test_bodies_that_cannot_be_laid():
+    s = toys.skeleton()
+    without = {r: j for r, j in s.roles.items() if r != "left_foot"}
+    with pytest.raises(KumiteError, match="left_foot"):
+        bodies.lay_body(Skeleton(s.names, s.parents, s.offsets, without))
+    with pytest.raises(KumiteError, match="mass"):
+        bodies.lay_body(s, total_mass=0)
+    with pytest.raises(KumiteError, match="body part 'tail'"):
+        bodies.lay_body(s).part("tail")

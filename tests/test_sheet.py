@@ -1,0 +1,70 @@
+"""Contact sheets and plots: pictures that show what they should."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from kumite.errors import KumiteError
+from kumite.export.plot import plot_hits
+from kumite.export.sheet import contact_sheet, recording_sheet
+from kumite.graph import Library
+from kumite.kernels.raster import draw_triangles
+from kumite.scene import LiveScene, load_scene, record
+from tests import toys
+
+
+def _still(count: int = 1):
+    clips = [toys.still(4) for _ in range(count)]
+    root = np.stack([c.root_position for c in clips], axis=1).copy()
+    root[:, :, 0] += np.arange(count)
+    return clips[0].skeleton, root, np.stack([c.wxyz for c in clips], axis=1)
+
+
+def test_a_sheet_has_a_cell_for_every_frame(tmp_path):
+    skeleton, root, wxyz = _still(2)
+    contact_sheet(tmp_path / "a.png", skeleton, root, wxyz, [0, 1, 2], columns=2, size=(160, 120))
+    image = np.asarray(Image.open(tmp_path / "a.png").convert("RGB")).astype(int)
+    assert abs(image.shape[1] - 320) < 20 and abs(image.shape[0] - 240) < 20
+    red = (image[..., 0] - image[..., 2] > 60).sum()
+    blue = (image[..., 2] - image[..., 0] > 60).sum()
+    assert red > 200 and blue > 200  # both corners are in the picture
+    contact_sheet(tmp_path / "b.png", skeleton, root, wxyz, [0, 1, 2], columns=2, size=(160, 120))
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_a_recording_is_drawn(library: Library, tmp_path):
+    scene = LiveScene(load_scene("target"), library)
+    recording_sheet(tmp_path / "r.png", record(scene, 1.0), size=(120, 100))
+    assert Image.open(tmp_path / "r.png").size[0] > 300
+
+
+def test_views_that_do_not_exist(tmp_path):
+    skeleton, root, wxyz = _still()
+    with pytest.raises(KumiteError, match="below"):
+        contact_sheet(tmp_path / "a.png", skeleton, root, wxyz, [0], view="below")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.jit_off
+def test_triangles_hide_what_is_behind_them():
+    """A near green triangle over a far red one that fills the picture, drawn in either order."""
+    xy = np.array([[-50, -50], [100, -50], [0, 100], [2, 2], [8, 2], [2, 8]], dtype=float)
+    near = np.array([0.1, 0.1, 0.1, 0.5, 0.5, 0.5])
+    colour = np.repeat([[1.0, 0, 0], [0, 1.0, 0]], 3, axis=0)
+    for faces in ([[0, 1, 2], [3, 4, 5]], [[3, 4, 5], [0, 1, 2]]):
+        depth, image = np.zeros((10, 10)), np.zeros((10, 10, 3))
+        draw_triangles(xy, near, colour, np.array(faces), depth, image)
+        inside = np.array([[x + y < 9 and x >= 2 and y >= 2 for x in range(10)] for y in range(10)])
+        assert np.allclose(image[inside], [0, 1, 0]) and np.allclose(depth[inside], 0.5)
+        assert np.allclose(image[~inside & (depth < 0.3)], [1, 0, 0])
+        assert (depth > 0).all() and (depth > 0.3).sum() >= inside.sum()
+
+
+def test_hits_are_plotted(library: Library, tmp_path):
+    for ending in ("png", "svg"):
+        plot_hits(tmp_path / f"hits.{ending}", library.strikes, "performer")
+        assert (tmp_path / f"hits.{ending}").stat().st_size > 10_000
+    with pytest.raises(KumiteError, match=r"expected \.png"):
+        plot_hits(tmp_path / "hits.xyz", library.strikes, "performer")
