@@ -78,7 +78,7 @@ def test_palettes_colour_every_role():
     mesh = bodies.body_mesh(toys.skeleton())
     for k in range(8):
         colours = mesh.colours(bodies.palette(k))
-        assert colours.shape == (len(mesh), 3) and 0 <= colours.min() and colours.max() <= 1
+        assert colours.shape == (len(mesh), 3) and colours.min() >= 0 and colours.max() <= 1
     assert bodies.palette(0) != bodies.palette(1)
 
 
