@@ -199,11 +199,12 @@ def _add_character(
                 rotation=_unit(xyzw[0, j]),
                 children=[first + c for c in skeleton.children(j)],
             ),
-            top=parent == NO_PARENT,
         )
         document.animate(first + j, "rotation", times, xyzw[:, j], gltf.VEC4)
     document.animate(first, "translation", times, recording.root_position[:, k], gltf.VEC3)
 
+    # A node of its own above each skeleton keeps importers from merging two into one armature.
+    document.add_node(gltf.Node(name=name, children=[first]), top=True)
     document.root.skins.append(
         gltf.Skin(
             name=name,
