@@ -83,7 +83,6 @@ def test_the_discount_means_the_same_at_any_rate():
     assert frame_discount(behaviour, 60.0) ** 4 == pytest.approx(0.97)
 
 
-@pytest.mark.jit_off
 def test_sweeps_equal_the_twin(library: Library):
     """A few states of the performer's graph, both behaviours, point by point, action by action."""
     small = _few_states(library)
