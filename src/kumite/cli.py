@@ -53,6 +53,17 @@ FileFpsOption = Annotated[
 ]
 
 
+@app.callback(invoke_without_command=True)
+def _root(
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
+    if version:
+        from kumite import __version__
+
+        print(f"kumite {__version__}")
+        raise typer.Exit
+
+
 def main() -> None:
     """Run the command line; bad input ends with one line on stderr and status 2."""
     try:

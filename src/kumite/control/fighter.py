@@ -24,7 +24,7 @@ class Temper:
     slack: float = 0.2  # how much less an action may gain than the best one, as a share of that
     boredom: float = 0.5  # how much of its gain an action loses while it was used recently
     memory: int = 6  # how many actions back "recently" goes
-    personal_space: float = 0.65  # m between the bodies that an action must leave
+    personal_space: float = 0.7  # m between the bodies that an action must leave
 
     def __post_init__(self) -> None:
         if self.approach < 0 or self.strike < 0 or self.approach + self.strike == 0:

@@ -29,7 +29,7 @@ class CharacterSettings(_Settings):
     strike: Annotated[Finite, Field(ge=0)] = 6.0
     facing: Annotated[Finite, Field(ge=0)] = 3.0
     few: Annotated[int, Field(ge=1, le=50)] = 3  # drawn from the best few actions
-    personal_space: Annotated[Finite, Field(ge=0, le=3)] = 0.65  # m kept to the other's body
+    personal_space: Annotated[Finite, Field(ge=0, le=3)] = 0.7  # m kept to the other's body
 
     @model_validator(mode="after")
     def _some_weight(self) -> CharacterSettings:
