@@ -48,7 +48,7 @@ def test_the_readmes_commands_run(tmp_path: Path, mocap: Path):
     lines = [line.split("#")[0].strip() for b in blocks("sh") for line in b.splitlines()]
     commands = [line for line in lines if line.startswith("kumite ")]
     assert len(commands) >= 6
-    (tmp_path / "my_mocap").symlink_to(mocap / "boxer")
+    (tmp_path / "my_mocap").symlink_to((mocap / "boxer").resolve())
     environment = {
         **os.environ,
         "DEMO_SECONDS": "2",

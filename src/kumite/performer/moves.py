@@ -1,16 +1,19 @@
-"""The repertoire as tables that an animator could edit.
+"""What a move is, and a style: the words in which the repertoire's tables are written.
 
-A move is written in the *stance frame*: its origin on the ground between the feet, +Z towards the
-opponent, +X to the performer's left. Lengths in metres, angles in degrees, times in seconds from the
-start of the move. A channel holds (time, value) keys; between keys it moves smoothly, and before the
-first and after the last it is in guard. Values are added to the guard's, but for hands: those are
-places of the fist's front, or ``aim(…)``: a place measured from what the blow is aimed at.
+A move is written in the *stance frame*: its origin on the ground between the feet, +Z towards
+the opponent, +X to the performer's left. Lengths in metres, angles in degrees, times in seconds
+from the start of the move. A channel holds (time, value) keys; between keys it moves smoothly, and
+before the first and after the last it is in guard. Values are added to the guard's, but for hands:
+those are places of the fist's front, or ``aim(…)``: a place measured from what the blow is aimed
+at.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+
+from kumite.errors import unknown
 
 Vector = tuple[float, ...]
 
@@ -29,12 +32,17 @@ def aim(left: float = 0.0, up: float = 0.0, ahead: float = 0.0) -> Aim:
 
 @dataclass(frozen=True)
 class Step:
-    """A foot leaves the ground and comes down where the stance has gone to meanwhile."""
+    """A foot leaves the ground and comes down where it stands in the stance.
+
+    The stance is that of the end of the move, or, for a ``stride`` of a gait, that of the middle of
+    the time until the foot is lifted again.
+    """
 
     foot: str  # left or right
     lift: float  # s
     land: float  # s
     height: float = 0.085  # m
+    stride: bool = False
 
 
 @dataclass(frozen=True)
@@ -57,216 +65,33 @@ class Move:
     steps: tuple[Step, ...] = ()
     travel: tuple[float, float, float] = (0.0, 0.0, 0.0)  # left, ahead [m], turned left [deg]
     blows: tuple[Blow, ...] = ()
+    glide: str = "ease"  # how the stance travels: ease, steady, start (from rest), stop (to rest)
+    holds: bool = True  # begins and ends in guard; a phase of a gait goes on from the one before
+    avoid: tuple[float, float] | None = None  # s in which the body is out of where it was
+    mark: float | None = None  # s of the first frame of a target movement
 
 
-GUARD: Mapping[str, Vector] = {
-    "pelvis": (-0.01, 0.935, 0.0),
-    "pelvis_turn": (-32.0, 6.0, 0.0),  # yaw, pitch (forward), roll (to the right)
-    "chest_turn": (-38.0, 17.0, 0.0),
-    "head_turn": (-4.0, 12.0, 0.0),
-    "left_hand": (0.075, 1.475, 0.40),
-    "right_hand": (-0.035, 1.455, 0.235),
-    "elbow": (0.0, 0.0),  # left, right: 0 hangs, 1 out at shoulder height
-    "heel": (2.0, 14.0),  # left, right: raised [deg]
-}
-FEET: Mapping[str, Vector] = {  # the ball of each foot and its yaw, in the stance frame
-    "left": (0.12, 0.24, -20.0),
-    "right": (-0.14, -0.22, -58.0),
-}
+@dataclass(frozen=True)
+class Style:
+    """A way of standing and the moves that begin and end in it."""
 
-_LEAD = (Step("left", 0.04, 0.25), Step("right", 0.50, 0.70, 0.055))  # the rear foot follows
-_FORWARD = (Step("left", 0.05, 0.30), Step("right", 0.30, 0.52, 0.06))
-_BACK = (Step("right", 0.05, 0.28, 0.07), Step("left", 0.26, 0.50))
-_LEFTWARD = (Step("left", 0.05, 0.29), Step("right", 0.31, 0.53, 0.06))
-_RIGHTWARD = (Step("right", 0.05, 0.28, 0.07), Step("left", 0.27, 0.51))
-_PIVOT = (Step("left", 0.04, 0.24, 0.075), Step("right", 0.22, 0.48, 0.06))
+    name: str
+    guard: Mapping[str, Vector]  # every channel's value at rest
+    feet: Mapping[
+        str, Vector
+    ]  # left, right: ball of the foot (x, z) and its yaw, in the stance frame
+    moves: tuple[Move, ...]
+    takes: Mapping[str, tuple[tuple[str, ...], int]]  # name: moves drawn from, how many performed
+    sway: float = 1.0  # how much of the bounce that never stops
+    blow_angle: float = 0.0  # deg by which a blow's target is varied to either side
+    blow_reach: tuple[float, float] = (0.0, 0.0)  # m nearer and farther
+    blow_height: tuple[float, float] = (0.0, 0.0)  # m lower and higher
+    travel: float = 0.3  # share by which steps and turns are varied
+    tempo: float = 0.1  # share by which durations are varied
 
-HEAD_HIGH = 1.55  # m, where a boxer's head is in guard
-BODY_HIGH = 1.15
-
-_JAB = {
-    "pelvis": (
-        (0.11, (0.0, -0.012, -0.02)),
-        (0.29, (0.02, -0.03, 0.10)),
-        (0.42, (0.01, -0.02, 0.06)),
-    ),
-    "pelvis_turn": ((0.12, (5, 0, 0)), (0.29, (-10, 5, 0)), (0.44, (-4, 2, 0))),
-    "chest_turn": ((0.12, (7, -1, 0)), (0.29, (-20, 6, 1)), (0.46, (-6, 2, 0))),
-    "head_turn": ((0.29, (2, 6, -3)),),
-    "left_hand": (
-        (0.05, (0.08, 1.47, 0.39)),
-        (0.13, (0.085, 1.45, 0.35)),
-        (0.285, aim(0, 0, -0.005)),
-        (0.32, aim(0, -0.003, 0.0)),
-        (0.44, (0.06, 1.49, 0.53)),
-        (0.58, (0.075, 1.47, 0.40)),
-    ),
-    "right_hand": ((0.30, (-0.03, 1.45, 0.30)),),
-    "elbow": ((0.13, (0.02, 0.0)), (0.25, (0.40, 0.0)), (0.33, (0.42, 0.0)), (0.48, (0.08, 0.0))),
-    "heel": ((0.30, (0, 10)),),
-}
-_CROSS = {
-    "pelvis": (
-        (0.12, (-0.01, -0.015, -0.03)),
-        (0.32, (0.03, -0.045, 0.10)),
-        (0.46, (0.02, -0.03, 0.06)),
-    ),
-    "pelvis_turn": ((0.13, (-6, 0, 0)), (0.31, (38, 4, 0)), (0.40, (34, 4, 0))),
-    "chest_turn": ((0.14, (-8, 0, 0)), (0.325, (66, 5, -2)), (0.41, (58, 5, -2))),
-    "head_turn": ((0.32, (2, 5, 3)),),
-    "right_hand": (
-        (0.05, (-0.035, 1.45, 0.23)),
-        (0.15, (-0.05, 1.44, 0.19)),
-        (0.32, aim(0, 0, -0.005)),
-        (0.355, aim(0, -0.005, 0.0)),
-        (0.50, (-0.05, 1.48, 0.42)),
-        (0.68, (-0.035, 1.455, 0.24)),
-    ),
-    "left_hand": (
-        (0.16, (0.07, 1.48, 0.38)),
-        (0.33, (0.09, 1.46, 0.24)),
-        (0.5, (0.085, 1.47, 0.30)),
-    ),
-    "elbow": ((0.15, (0.0, 0.04)), (0.28, (0.0, 0.38)), (0.36, (0.0, 0.40)), (0.54, (0.0, 0.08))),
-    "heel": ((0.14, (2, 18)), (0.31, (0, 44)), (0.44, (0, 38))),
-}
-_LEFT_HOOK = {
-    "pelvis": ((0.14, (0.035, -0.04, 0.02)), (0.36, (-0.01, -0.03, 0.05)), (0.5, (0, -0.02, 0.03))),
-    "pelvis_turn": ((0.15, (18, 2, 0)), (0.36, (-26, 2, 0)), (0.46, (-26, 2, 0))),
-    "chest_turn": ((0.17, (26, 2, 0)), (0.37, (-36, 3, 0)), (0.47, (-38, 3, 0))),
-    "head_turn": ((0.17, (4, 3, 0)), (0.38, (-3, 3, 0))),
-    "left_hand": (
-        (0.06, (0.08, 1.47, 0.39)),
-        (0.19, (0.27, 1.41, 0.30)),
-        (0.29, (0.40, 1.51, 0.47)),
-        (0.365, aim(0.02, 0, 0)),
-        (0.42, aim(-0.17, -0.005, -0.05)),
-        (0.60, (0.0, 1.48, 0.36)),
-        (0.76, (0.075, 1.475, 0.40)),
-    ),
-    "right_hand": ((0.36, (-0.05, 1.47, 0.22)),),
-    "elbow": (
-        (0.12, (0.05, 0)),
-        (0.24, (0.75, 0)),
-        (0.36, (1.0, 0)),
-        (0.44, (0.9, 0)),
-        (0.62, (0.15, 0)),
-    ),
-    "heel": ((0.36, (30, 12)), (0.5, (18, 12))),
-}
-_RIGHT_HOOK = {
-    "pelvis": (
-        (0.15, (-0.03, -0.035, -0.02)),
-        (0.38, (0.02, -0.035, 0.07)),
-        (0.52, (0.01, -0.02, 0.04)),
-    ),
-    "pelvis_turn": ((0.16, (-10, 2, 0)), (0.38, (40, 3, 0)), (0.47, (40, 3, 0))),
-    "chest_turn": ((0.18, (-14, 2, 0)), (0.39, (70, 4, 0)), (0.48, (72, 4, 0))),
-    "head_turn": ((0.19, (-4, 3, 0)), (0.40, (3, 3, 0))),
-    "right_hand": (
-        (0.06, (-0.035, 1.45, 0.235)),
-        (0.20, (-0.25, 1.40, 0.14)),
-        (0.31, (-0.36, 1.51, 0.40)),
-        (0.385, aim(-0.02, 0, 0)),
-        (0.44, aim(0.16, -0.005, -0.05)),
-        (0.62, (0.03, 1.47, 0.30)),
-        (0.80, (-0.035, 1.455, 0.235)),
-    ),
-    "left_hand": ((0.38, (0.10, 1.47, 0.27)),),
-    "elbow": (
-        (0.13, (0, 0.05)),
-        (0.26, (0, 0.75)),
-        (0.38, (0, 1.0)),
-        (0.46, (0, 0.9)),
-        (0.66, (0, 0.15)),
-    ),
-    "heel": ((0.38, (2, 42)), (0.52, (2, 30))),
-}
-
-
-def _shifted(keys: Mapping, by: float) -> dict:
-    """The same keys, later."""
-    return {c: tuple((t + by, v) for t, v in rows) for c, rows in keys.items()}
-
-
-def _after(first: Mapping, second: Mapping, at: float) -> dict:
-    """Two blows in a row: keys of the first up to ``at``, then those of the second."""
-    late = _shifted(second, at)
-    out = {}
-    for c in {*first, *late}:
-        rows = late.get(c, ())
-        begin = min((t for t, _ in rows), default=float("inf"))
-        out[c] = tuple(r for r in first.get(c, ()) if r[0] < begin - 0.04) + tuple(rows)
-    return out
-
-
-MOVES: tuple[Move, ...] = (
-    Move("guard", "idle", 0.9, steps=(Step("left", 0.05, 0.26, 0.08),)),
-    Move(
-        "guard_shift", "idle", 1.1,
-        {"pelvis": ((0.35, (0.03, -0.015, 0.05)), (0.75, (-0.02, -0.01, -0.04))),
-         "chest_turn": ((0.35, (4, 2, 1)), (0.75, (-4, -1, -1))),
-         "head_turn": ((0.4, (2, 0, 2)), (0.8, (-2, 0, -2)))},
-        (Step("left", 0.05, 0.27, 0.08), Step("right", 0.45, 0.66, 0.06)),
-    ),
-    Move("step_forward", "transition", 0.72, {"pelvis": ((0.2, (0, -0.02, 0.0)),)}, _FORWARD, (0, 0.30, 0)),
-    Move("step_back", "transition", 0.72, {"pelvis": ((0.2, (0, -0.02, 0.0)),)}, _BACK, (0, -0.30, 0)),
-    Move("step_left", "transition", 0.74, {"pelvis": ((0.2, (0, -0.02, 0.0)),)}, _LEFTWARD, (0.28, 0, 0)),
-    Move("step_right", "transition", 0.74, {"pelvis": ((0.2, (0, -0.02, 0.0)),)}, _RIGHTWARD, (-0.28, 0, 0)),
-    Move("turn_left", "transition", 0.70, {"head_turn": ((0.15, (12, 0, 0)),)}, _PIVOT, (0, 0, 38)),
-    Move("turn_right", "transition", 0.70, {"head_turn": ((0.15, (-12, 0, 0)),)}, _PIVOT, (0, 0, -38)),
-    Move("jab", "attack", 0.78, _JAB, _LEAD, (0, 0.05, 0), (Blow("left_hand", 0.32, (2, 0.84, HEAD_HIGH)),)),
-    Move("cross", "attack", 0.86, _CROSS, _LEAD, (0, 0.04, 0), (Blow("right_hand", 0.355, (0, 0.84, HEAD_HIGH)),)),
-    Move("left_hook", "attack", 0.92, _LEFT_HOOK, _LEAD, (0, 0.03, 0), (Blow("left_hand", 0.365, (4, 0.62, HEAD_HIGH)),)),
-    Move("right_hook", "attack", 0.96, _RIGHT_HOOK, _LEAD, (0, 0.03, 0), (Blow("right_hand", 0.385, (-2, 0.62, HEAD_HIGH)),)),
-    Move(
-        "one_two", "attack", 1.16, _after(_JAB, _CROSS, 0.30), _LEAD, (0, 0.06, 0),
-        (Blow("left_hand", 0.32, (2, 0.84, HEAD_HIGH)), Blow("right_hand", 0.655, (0, 0.84, HEAD_HIGH))),
-    ),
-    Move(
-        "duck", "defence", 0.95,
-        {"pelvis": ((0.14, (0, 0.005, 0)), (0.36, (0.0, -0.27, -0.04)), (0.46, (0.02, -0.27, -0.02))),
-         "pelvis_turn": ((0.38, (4, 16, 0)),),
-         "chest_turn": ((0.38, (8, 32, -2)), (0.48, (8, 30, 3))),
-         "head_turn": ((0.38, (0, 8, 0)),),
-         "left_hand": ((0.38, (0.09, 1.18, 0.46)), (0.48, (0.09, 1.18, 0.46))),
-         "right_hand": ((0.38, (-0.06, 1.17, 0.40)), (0.48, (-0.06, 1.17, 0.40))),
-         "heel": ((0.38, (6, 34)), (0.48, (6, 34)))},
-        (Step("left", 0.04, 0.22, 0.075),),
-    ),
-    Move(
-        "struck_head_front", "reaction", 0.95,
-        {"pelvis": ((0.12, (0, 0.0, -0.05)), (0.36, (0, -0.03, -0.10))),
-         "pelvis_turn": ((0.14, (-3, -5, 0)),),
-         "chest_turn": ((0.11, (-4, -16, 0)), (0.22, (-5, -22, 0)), (0.5, (0, -4, 0))),
-         "head_turn": ((0.08, (0, -26, 0)), (0.16, (0, -34, 0)), (0.34, (0, 6, 0))),
-         "left_hand": ((0.16, (0.12, 1.41, 0.27)), (0.45, (0.09, 1.48, 0.28))),
-         "right_hand": ((0.18, (-0.10, 1.39, 0.12)), (0.45, (-0.05, 1.48, 0.17)))},
-        _BACK, (0, -0.16, 0),
-    ),
-    Move(
-        "struck_head_left", "reaction", 0.95,
-        {"pelvis": ((0.12, (-0.03, -0.01, -0.01)), (0.36, (-0.06, -0.03, -0.03))),
-         "chest_turn": ((0.12, (-14, 0, 7)), (0.24, (-20, 2, 10)), (0.5, (-4, 0, 2))),
-         "head_turn": ((0.08, (-30, -4, 12)), (0.16, (-42, -6, 18)), (0.36, (-6, 4, 4))),
-         "left_hand": ((0.18, (0.04, 1.43, 0.34)), (0.45, (0.06, 1.50, 0.32))),
-         "right_hand": ((0.18, (-0.14, 1.38, 0.17)), (0.45, (-0.06, 1.48, 0.20)))},
-        _RIGHTWARD, (-0.10, -0.04, 0),
-    ),
-    Move(
-        "struck_head_right", "reaction", 0.95,
-        {"pelvis": ((0.12, (0.03, -0.01, -0.01)), (0.36, (0.05, -0.03, -0.03))),
-         "chest_turn": ((0.12, (14, 0, -7)), (0.24, (20, 2, -10)), (0.5, (4, 0, -2))),
-         "head_turn": ((0.08, (30, -4, -12)), (0.16, (42, -6, -18)), (0.36, (6, 4, -4))),
-         "left_hand": ((0.18, (0.16, 1.41, 0.33)), (0.45, (0.09, 1.50, 0.33))),
-         "right_hand": ((0.18, (-0.02, 1.41, 0.22)), (0.45, (-0.03, 1.48, 0.24)))},
-        _LEFTWARD, (0.10, -0.04, 0),
-    ),
-)  # fmt: skip
-
-# How far a blow's target and travel may be varied: what a shadow boxer does from one to the next.
-BLOW_ANGLE = 16.0  # deg to either side
-BLOW_REACH = (-0.10, 0.06)  # m nearer and farther
-BLOW_HEIGHT = (-0.12, 0.07)  # m lower and higher
-TRAVEL = 0.5  # share by which steps and turns are varied
-TEMPO = 0.12  # share by which durations are varied
+    def find(self, label: str) -> Move:
+        """A move by label. Errors: unknown, with near names."""
+        for move in self.moves:
+            if move.label == label:
+                return move
+        raise unknown("move", label, [m.label for m in self.moves])

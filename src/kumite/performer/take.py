@@ -12,19 +12,8 @@ from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 from kumite.clip import SIDES, Clip, forward_kinematics, tip_positions
 from kumite.errors import KumiteError, unknown
 from kumite.performer.figure import BALL_HEIGHT, Targets, lowered, pose, skeleton
-from kumite.performer.moves import (
-    BLOW_ANGLE,
-    BLOW_HEIGHT,
-    BLOW_REACH,
-    FEET,
-    GUARD,
-    MOVES,
-    TEMPO,
-    TRAVEL,
-    Aim,
-    Move,
-)
-from kumite.rotation import planar_apply, planar_compose
+from kumite.performer.moves import Aim, Move, Style
+from kumite.rotation import planar_apply
 
 FPS = 60.0
 SETTLE = 0.10  # s of guard between two moves
@@ -52,6 +41,8 @@ class Action:
     stop: int
     kind: str
     label: str
+    avoid: tuple[int, int] | None = None  # frames in which the body is out of where it was
+    mark: int | None = None  # first frame of a target movement
 
 
 @dataclass(frozen=True)
@@ -73,36 +64,31 @@ class Performed:
     targets: tuple[tuple[float, float, float], ...] = ()  # of each blow
 
 
-def find_move(label: str) -> Move:
-    """A move of the repertoire by label."""
-    for move in MOVES:
-        if move.label == label:
-            return move
-    raise unknown("move", label, [m.label for m in MOVES])
-
-
 def as_written(move: Move) -> Performed:
     return Performed(move, 1.0, move.travel, tuple(b.target for b in move.blows))
 
 
-def vary(move: Move, rng: np.random.Generator) -> Performed:
+def vary(move: Move, style: Style, rng: np.random.Generator) -> Performed:
     """A move as a person does it the next time: other pace, other length, another target."""
     x, z, yaw = move.travel
-    scale = rng.uniform(1 - TRAVEL, 1 + TRAVEL)
+    pace = float(rng.uniform(1 - style.tempo, 1 + style.tempo))
+    if not move.holds:
+        return Performed(move, 1.0, move.travel)  # phases of a gait must fit each other
+    scale = rng.uniform(1 - style.travel, 1 + style.travel)
     drift = rng.normal(0, 0.02, 2) if move.steps else np.zeros(2)
     swing = rng.normal(0, 4.0) if move.steps else 0.0
     if move.kind == "attack":
         z += rng.choice([0.0, 0.0, 0.10, 0.18])  # on the spot, or stepping in
-    shift = (rng.uniform(-1, 1) * BLOW_ANGLE, rng.uniform(*BLOW_REACH), rng.uniform(*BLOW_HEIGHT))
+    shift = (
+        rng.uniform(-1, 1) * style.blow_angle,
+        rng.uniform(*style.blow_reach),
+        rng.uniform(*style.blow_height),
+    )
     targets = tuple(
         (b.target[0] + shift[0], b.target[1] + shift[1], b.target[2] + shift[2]) for b in move.blows
     )
-    return Performed(
-        move,
-        float(rng.uniform(1 - TEMPO, 1 + TEMPO)),
-        (x * scale + drift[0], z * scale + drift[1], yaw * scale + swing),
-        targets,
-    )
+    travel = (x * scale + drift[0], z * scale + drift[1], yaw * scale + swing)
+    return Performed(move, pace, travel, targets)
 
 
 @dataclass
@@ -128,7 +114,7 @@ class _Track:
 
 
 def perform_take(
-    name: str, score: Sequence[Performed], *, rng: np.random.Generator
+    name: str, score: Sequence[Performed], style: Style, *, rng: np.random.Generator
 ) -> tuple[Clip, Truth]:
     """A clip of moves one after the other, beginning and ending in guard, with its truth.
 
@@ -139,13 +125,13 @@ def perform_take(
     starts, t = [], LEAD_IN
     for p in score:
         starts.append(t)
-        t += p.move.seconds * p.tempo + SETTLE
-    total = t + LEAD_IN - SETTLE
+        t += p.move.seconds * p.tempo + (SETTLE if p.move.holds else 0.0)
+    total = t + LEAD_IN
     at = np.arange(round(total * FPS) + 1) / FPS
 
-    stance, feet, on_ground = _walk(score, starts, at)
-    place = {c: v.sample(at) for c, v in _channels(score, starts, total).items()}
-    breath = _alive(at, rng)
+    stance, feet, on_ground = _walk(score, starts, at, style)
+    place = {c: v.sample(at) for c, v in _channels(score, starts, total, style).items()}
+    breath = _alive(at, style.sway, rng)
     carried = {
         c: planar_apply(stance, place[c] + breath.get(c, 0.0))
         for c in ("pelvis", "left_hand", "right_hand")
@@ -177,23 +163,23 @@ def perform_take(
 
 
 def _channels(
-    score: Sequence[Performed], starts: Sequence[float], total: float
+    score: Sequence[Performed], starts: Sequence[float], total: float, style: Style
 ) -> dict[str, _Track]:
-    tracks = {c: _Track(np.array(v)) for c, v in GUARD.items()}
+    tracks = {c: _Track(np.array(v)) for c, v in style.guard.items()}
     for track in tracks.values():
         track.add(0.0, track.guard)
     for p, start in zip(score, starts):
         end = start + p.move.seconds * p.tempo
         for c in p.move.keys:
             if c not in tracks:
-                raise unknown(f"channel of {p.move.label}", c, GUARD)
+                raise unknown(f"channel of {p.move.label}", c, style.guard)
         for c, track in tracks.items():
             rows = p.move.keys.get(c, ())
-            if rows:
+            if rows and p.move.holds:
                 track.add(start, track.guard)
             blow = 0
             for time, value in rows:
-                if not 0 < time < p.move.seconds:
+                if not (0 < time < p.move.seconds or (time == 0 and not p.move.holds)):
                     raise KumiteError(
                         f"{p.move.label}: {c} has a key at {time} s; expected between 0 and "
                         f"{p.move.seconds} s"
@@ -209,7 +195,7 @@ def _channels(
                     track.add(moment, np.array(value))
                 else:
                     track.add(moment, track.guard + np.array(value))
-            if rows:
+            if rows and p.move.holds:
                 track.add(end, track.guard)
     for track in tracks.values():
         track.add(total, track.guard)
@@ -226,52 +212,71 @@ def _aimed(target: tuple[float, float, float], value: Aim) -> np.ndarray:
 
 
 def _walk(
-    score: Sequence[Performed], starts: Sequence[float], at: np.ndarray
+    score: Sequence[Performed], starts: Sequence[float], at: np.ndarray, style: Style
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Stance frames [F, 3], feet [F, 2, 4] (ball [m] and yaw) and contacts [F, 2] of a take.
 
     The stance glides while feet step; a foot that is not stepping does not move at all.
     """
-    here = np.zeros(3)
-    stance = np.zeros((len(at), 3))
+    stance = _glide(score, starts, at)
     feet = np.zeros((len(at), 2, 4))
     on_ground = np.ones((len(at), 2), dtype=bool)
-    down = [_foothold(here, side) for side in SIDES]
-    feet[:] = np.array(down)
-    for p, start in zip(score, starts):
-        x, z, yaw = p.travel
-        there = planar_compose(here, np.array([x, z, np.radians(yaw)]))
-        steps = p.move.steps
-        if not steps and np.any(np.abs(p.travel) > 1e-9):
-            raise KumiteError(f"{p.move.label}: travels without a step")
-        if steps:
-            begin = start + min(s.lift for s in steps) * p.tempo - 0.04
-            end = start + max(s.land for s in steps) * p.tempo + 0.06
-            w = _ease((at - begin) / (end - begin))[:, None]
-            later = at >= begin
-            glide = np.concatenate([there[:2] - here[:2], [np.radians(yaw)]])
-            stance[later] = (here + w * glide)[later]
-        for step in steps:
-            s = SIDES.index(step.foot)
-            goal = _foothold(there, step.foot)
-            lift, land = start + step.lift * p.tempo, start + step.land * p.tempo
+    for s, side in enumerate(SIDES):
+        steps = [
+            (start + step.lift * p.tempo, start + step.land * p.tempo, step, p, start)
+            for p, start in zip(score, starts)
+            for step in p.move.steps
+            if step.foot == side
+        ]
+        down = _foothold(stance[0], side, style)
+        feet[:, s] = down
+        for n, (lift, land, step, p, start) in enumerate(steps):
+            again = steps[n + 1][0] if n + 1 < len(steps) else land
+            moment = start + p.move.seconds * p.tempo
+            if step.stride:
+                moment = 0.5 * (land + again) if n + 1 < len(steps) else at[-1]
+            goal = _foothold(stance[min(round(moment * FPS), len(at) - 1)], side, style)
             u = (at - lift) / (land - lift)
-            w = _ease(u)[:, None]
-            after = at > lift
-            move = goal - down[s]
+            move = goal - down
             move[3] = (move[3] + np.pi) % (2 * np.pi) - np.pi
-            feet[after, s] = (down[s] + w * move)[after]
+            after = at > lift
+            feet[after, s] = (down + _ease(u)[:, None] * move)[after]
             air = (u > 0) & (u < 1)
             feet[air, s, 1] += step.height * np.sin(np.pi * _lean(u[air])) ** 2
             on_ground[air, s] = False
-            down[s] = down[s] + move
-        here = stance[-1] if steps else here
+            down = down + move
     return stance, feet, on_ground
 
 
-def _foothold(stance: np.ndarray, side: str) -> np.ndarray:
+def _glide(score: Sequence[Performed], starts: Sequence[float], at: np.ndarray) -> np.ndarray:
+    """Stance frames [F, 3]: each move's travel, carried out along an arc at its own pace."""
+    pace = np.zeros((len(at), 3))  # travelled in each frame, in the stance's own axes
+    for p, start in zip(score, starts):
+        if not np.any(np.abs(p.travel) > 1e-9):
+            continue
+        steps = p.move.steps
+        if not steps:
+            raise KumiteError(f"{p.move.label}: travels without a step")
+        if p.move.glide not in GLIDES:
+            raise unknown(f"glide of {p.move.label}", p.move.glide, GLIDES)
+        begin, end = start, start + p.move.seconds * p.tempo
+        if p.move.glide == "ease":
+            begin = start + min(s.lift for s in steps) * p.tempo - 0.04
+            end = start + max(s.land for s in steps) * p.tempo + 0.06
+        done = GLIDES[p.move.glide]((at - begin) / (end - begin))
+        x, z, yaw = p.travel
+        pace[1:] += np.diff(done)[:, None] * np.array([x, z, np.radians(yaw)])
+    # Half of a frame's turn comes before its shift and half after: arcs come out round.
+    yaw = np.cumsum(pace[:, 2])
+    mid = yaw - 0.5 * pace[:, 2]
+    x = np.cumsum(np.cos(mid) * pace[:, 0] + np.sin(mid) * pace[:, 1])
+    z = np.cumsum(-np.sin(mid) * pace[:, 0] + np.cos(mid) * pace[:, 1])
+    return np.stack([x, z, yaw], axis=1)
+
+
+def _foothold(stance: np.ndarray, side: str, style: Style) -> np.ndarray:
     """Ball [3] and yaw of a foot that stands in a stance."""
-    x, z, yaw = FEET[side]
+    x, z, yaw = style.feet[side]
     ball = planar_apply(stance, np.array([x, BALL_HEIGHT, z]))
     return np.array([*ball, stance[2] + np.radians(yaw)])
 
@@ -282,12 +287,21 @@ def _ease(u: np.ndarray) -> np.ndarray:
     return u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
 
 
+GLIDES = {
+    "ease": _ease,
+    "steady": lambda u: np.clip(u, 0.0, 1.0),
+    "start": lambda u: np.clip(u, 0.0, 1.0) ** 2,
+    "stop": lambda u: 1.0 - (1.0 - np.clip(u, 0.0, 1.0)) ** 2,
+}
+"""How a stance travels over a move, 0..1: from rest to rest, at one speed, from rest, to rest."""
+
+
 def _lean(u: np.ndarray) -> np.ndarray:
     """A foot rises faster than it is put down."""
     return u**0.85
 
 
-def _alive(at: np.ndarray, rng: np.random.Generator) -> dict[str, np.ndarray]:
+def _alive(at: np.ndarray, sway_share: float, rng: np.random.Generator) -> dict[str, np.ndarray]:
     """Bounce and breathing: what never stops while a boxer stands. By channel, [F, 3]."""
     beat = rng.uniform(1.5, 1.9)
     phase = rng.uniform(0, 2 * np.pi, 8)
@@ -296,11 +310,11 @@ def _alive(at: np.ndarray, rng: np.random.Generator) -> dict[str, np.ndarray]:
         return np.sin(2 * np.pi * hertz * at + phase[k])
 
     zero = np.zeros(len(at))
-    bounce = SWAY * wave(beat, 0)
-    sway = 0.006 * wave(0.5 * beat, 1)
+    bounce = sway_share * SWAY * wave(beat, 0)
+    sway = sway_share * 0.006 * wave(0.5 * beat, 1)
     breath = np.radians(0.9) * wave(0.45, 2)
     return {
-        "pelvis": np.stack([sway, bounce, 0.005 * wave(0.37 * beat, 3)], axis=1),
+        "pelvis": np.stack([sway, bounce, sway_share * 0.005 * wave(0.37 * beat, 3)], axis=1),
         "chest_turn": np.stack([np.radians(1.2) * wave(0.6, 4), breath, zero], axis=1),
         "head_turn": np.stack([np.radians(1.0) * wave(0.4, 5), 0.4 * breath, zero], axis=1),
         "left_hand": np.stack([0.006 * wave(0.9, 6), bounce + 0.006 * wave(0.7, 7), sway], axis=1),
@@ -321,12 +335,14 @@ def _strikes(clip: Clip, score: Sequence[Performed], starts: Sequence[float]) ->
 
 
 def _actions(score: Sequence[Performed], starts: Sequence[float]) -> tuple[Action, ...]:
-    return tuple(
-        Action(
-            round(start * FPS),
-            round((start + p.move.seconds * p.tempo) * FPS),
-            p.move.kind,
-            p.move.label,
-        )
-        for p, start in zip(score, starts)
-    )
+    out = []
+    for p, start in zip(score, starts):
+
+        def frame(time: float, start: float = start, tempo: float = p.tempo) -> int:
+            return round((start + time * tempo) * FPS)
+
+        m = p.move
+        avoid = None if m.avoid is None else (frame(m.avoid[0]), frame(m.avoid[1]))
+        mark = None if m.mark is None else frame(m.mark)
+        out.append(Action(frame(0.0), frame(m.seconds), m.kind, m.label, avoid, mark))
+    return tuple(out)
