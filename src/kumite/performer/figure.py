@@ -19,6 +19,7 @@ BALL = np.array([0.0, -0.062, 0.125])  # from the ankle to the ball of the foot,
 BALL_HEIGHT = 0.026  # of the ball's joint above the ground, foot flat
 STRAIGHTEST = 0.985  # of a leg's length: knees never lock
 ARM_STRAIGHTEST = 0.985
+CLOSEST_FIST = 0.15  # m from the shoulder: an elbow folds no further
 
 _BONES: tuple[tuple[str, str | None, tuple[float, float, float], str | None], ...] = (
     ("Hips", None, (0.0, 0.0, 0.0), "pelvis"),
@@ -157,7 +158,7 @@ def pose(targets: Targets) -> tuple[np.ndarray, np.ndarray]:
             FOREARM + FIST,
             pole,
             np.array([sign, 0.0, 0.0]),
-            ARM_STRAIGHTEST,
+            (CLOSEST_FIST, ARM_STRAIGHTEST * (UPPER_ARM + FOREARM + FIST)),
         )
         local[:, joint[f"{side}Arm"]] = multiply(conjugate(clavicle), upper)
         local[:, joint[f"{side}ForeArm"]] = multiply(conjugate(upper), lower)
@@ -167,7 +168,13 @@ def pose(targets: Targets) -> tuple[np.ndarray, np.ndarray]:
         knee = rotate(_yaw(targets.foot_turn[:, s, 0]), np.array([0.0, 0.0, 1.0]))
         knee = knee + 0.5 * rotate(hips, np.array([0.25 * sign, 0.0, 1.0]))
         thigh, shin = _two_bones(
-            hip, _ankle(targets, s), THIGH, SHIN, knee, np.array([0.0, -1.0, 0.0]), 0.999
+            hip,
+            _ankle(targets, s),
+            THIGH,
+            SHIN,
+            knee,
+            np.array([0.0, -1.0, 0.0]),
+            (0.1, 0.999 * (THIGH + SHIN)),
         )
         local[:, joint[f"{side}UpLeg"]] = multiply(conjugate(hips), thigh)
         local[:, joint[f"{side}Leg"]] = multiply(conjugate(thigh), shin)
@@ -198,17 +205,18 @@ def _two_bones(
     second: float,
     pole: np.ndarray,
     axis: np.ndarray,
-    straightest: float,
+    reach: tuple[float, float],
 ) -> tuple[np.ndarray, np.ndarray]:
     """World rotations [F, 4] of two bones from root [F, 3] to goal [F, 3].
 
-    pole [F, 3]: the way the middle joint points; axis [3]: the bones' direction at rest. The bend's
-    axis is the cross product of the two, so a hinge bends one way only.
+    pole [F, 3]: the way the middle joint points; axis [3]: the bones' direction at rest; reach: the
+    shortest and the longest distance [m] between the ends that the bones may span. The bend's axis
+    is the cross product of pole and direction, so a hinge bends one way only.
     """
     to = goal - root
     length = np.linalg.norm(to, axis=1, keepdims=True)
     way = to / np.maximum(length, 1e-6)
-    d = np.clip(length[:, 0], abs(first - second) + 0.02, straightest * (first + second))
+    d = np.clip(length[:, 0], *reach)
     out = pole - np.sum(pole * way, axis=1, keepdims=True) * way
     out = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-6)
     along = (first**2 - second**2 + d**2) / (2 * d)
