@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from kumite import performer
-from kumite.clip import concatenate
+from kumite.clip import Clip, concatenate
 from kumite.errors import KumiteError
 from kumite.graph.library import VERSION, Library, build_library, load_library, save_library
 
@@ -20,7 +20,7 @@ def builtin_library(
 ) -> Library:
     """The built-in performer's motion graph, kept in ``cache`` under the content of its clips."""
     progress("performing")
-    clips = concatenate(performer.perform().clips, FPS)
+    clips = concatenate(_voluntary(performer.perform()), FPS)
     h = hashlib.sha256(f"{VERSION}".encode())
     h.update(clips.root_position.tobytes())
     h.update(clips.wxyz.tobytes())
@@ -35,3 +35,12 @@ def builtin_library(
         with contextlib.suppress(KumiteError):  # a cache that cannot be written only costs time
             save_library(path, library)
     return library
+
+
+def _voluntary(performance: performer.Performance) -> list[Clip]:
+    """Clips without reactions: nobody chooses to be struck."""
+    return [
+        clip
+        for clip, truth in zip(performance.clips, performance.truth)
+        if all(action.kind != "reaction" for action in truth.actions)
+    ]
