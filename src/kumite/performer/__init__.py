@@ -15,7 +15,8 @@ from kumite.clip import Clip
 from kumite.errors import unknown
 from kumite.performer.boxing import BOXING
 from kumite.performer.figure import skeleton
-from kumite.performer.moves import Blow, Move, Step, Style, aim
+from kumite.performer.locomotion import LOCOMOTION
+from kumite.performer.moves import Blow, Move, Step, Style, Take, aim
 from kumite.performer.take import (
     Action,
     Performed,
@@ -26,7 +27,7 @@ from kumite.performer.take import (
     vary,
 )
 
-STYLES = {style.name: style for style in (BOXING,)}
+STYLES = {style.name: style for style in (BOXING, LOCOMOTION)}
 
 
 @dataclass(frozen=True)
@@ -47,14 +48,16 @@ def perform(style: str = "boxing", seed: int = 0) -> Performance:
     chosen = STYLES[style]
     clips, truths = [], []
     streams = np.random.SeedSequence(seed).spawn(len(chosen.takes))
-    for (name, (labels, count)), stream in zip(chosen.takes.items(), streams):
+    for (name, take), stream in zip(chosen.takes.items(), streams):
         rng = np.random.default_rng(stream)
-        score = []
-        while len(score) < count:
+        order = list(take.moves)
+        if take.count is not None:
             # Every move once before any comes again: a shuffled deck, not dice.
-            deck = rng.permutation(len(labels))
-            score += [vary(chosen.find(labels[k]), chosen, rng) for k in deck]
-        clip, truth = perform_take(name, score[:count], chosen, rng=rng)
+            order = []
+            while len(order) < take.count:
+                order += [take.moves[k] for k in rng.permutation(len(take.moves))]
+        score = [vary(chosen.find(label), chosen, rng) for label in order[: take.count]]
+        clip, truth = perform_take(name, score, chosen, rng=rng)
         clips.append(clip)
         truths.append(truth)
     return Performance(tuple(clips), tuple(truths))
@@ -62,6 +65,7 @@ def perform(style: str = "boxing", seed: int = 0) -> Performance:
 
 __all__ = [
     "BOXING",
+    "LOCOMOTION",
     "STYLES",
     "Action",
     "Blow",
@@ -71,6 +75,7 @@ __all__ = [
     "Step",
     "Strike",
     "Style",
+    "Take",
     "Truth",
     "aim",
     "as_written",

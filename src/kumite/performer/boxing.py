@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from kumite.performer.moves import Aim, Blow, Move, Step, Style, Vector, aim
+from kumite.performer.moves import Aim, Blow, Move, Step, Style, Take, Vector, aim
 
 GUARD: Mapping[str, Vector] = {
     "pelvis": (-0.01, 0.935, 0.0),
@@ -13,7 +13,7 @@ GUARD: Mapping[str, Vector] = {
     "head_turn": (-4.0, 12.0, 0.0),
     "left_hand": (0.075, 1.475, 0.40),
     "right_hand": (-0.035, 1.455, 0.235),
-    "elbow": (0.0, 0.0),  # left, right: 0 hangs, 1 out at shoulder height
+    "elbow": (0.0, 0.0),  # left, right: 0 before the ribs, 1 out at the shoulder, -1 behind
     "heel": (2.0, 14.0),  # left, right: raised [deg]
 }
 FEET: Mapping[str, Vector] = {  # the ball of each foot and its yaw, in the stance frame
@@ -442,29 +442,37 @@ BOXING = Style(
     FEET,
     MOVES,
     {
-        "guard": (("guard", "guard_shift"), 12),
-        "footwork": (
+        "guard": Take(("guard", "guard_shift"), 12),
+        "footwork": Take(
             (*(m.label for m in MOVES if m.label.startswith("step_")), "guard", "guard_shift"),
             36,
         ),
-        "turns": (("turn_left", "turn_right", "pivot_left", "pivot_right", "step_back"), 24),
-        "jab": (("jab", "jab", "guard", "step_back", "turn_left", "turn_right"), 36),
-        "cross": (("cross", "cross", "guard", "step_back", "turn_left", "turn_right"), 34),
-        "hooks": (("left_hook", "right_hook", "guard", "step_back", "turn_left", "turn_right"), 34),
-        "one_two": (("one_two", "one_two", "step_back", "guard", "turn_left", "turn_right"), 30),
-        "uppercuts": (("left_uppercut", "right_uppercut", "guard", "step_back", "turn_left"), 26),
-        "low": ((*(m.label for m in MOVES if m.label.endswith("_low")), "guard", "step_back"), 30),
-        "combinations": (("one_two_hook", "one_two", "step_back", "turn_right"), 20),
-        "defence": ((*(m.label for m in MOVES if m.kind == "defence"), "guard"), 44),
-        "counter": (
+        "turns": Take(("turn_left", "turn_right", "pivot_left", "pivot_right", "step_back"), 24),
+        "jab": Take(("jab", "jab", "guard", "step_back", "turn_left", "turn_right"), 36),
+        "cross": Take(("cross", "cross", "guard", "step_back", "turn_left", "turn_right"), 34),
+        "hooks": Take(
+            ("left_hook", "right_hook", "guard", "step_back", "turn_left", "turn_right"), 34
+        ),
+        "one_two": Take(
+            ("one_two", "one_two", "step_back", "guard", "turn_left", "turn_right"), 30
+        ),
+        "uppercuts": Take(
+            ("left_uppercut", "right_uppercut", "guard", "step_back", "turn_left"), 26
+        ),
+        "low": Take(
+            (*(m.label for m in MOVES if m.label.endswith("_low")), "guard", "step_back"), 30
+        ),
+        "combinations": Take(("one_two_hook", "one_two", "step_back", "turn_right"), 20),
+        "defence": Take((*(m.label for m in MOVES if m.kind == "defence"), "guard"), 44),
+        "counter": Take(
             ("slip_left", "cross", "slip_right", "left_hook", "duck", "jab", "step_back"),
             30,
         ),
-        "struck": (
+        "struck": Take(
             (*(m.label for m in MOVES if m.kind == "reaction"), "guard", "step_forward"),
             36,
         ),
-        "shadow": (tuple(m.label for m in MOVES if m.kind != "reaction"), 48),
+        "shadow": Take(tuple(m.label for m in MOVES if m.kind != "reaction"), 48),
     },
     blow_angle=16.0,
     blow_reach=(-0.05, 0.06),

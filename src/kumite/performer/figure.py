@@ -79,7 +79,7 @@ class Targets:
     chest_turn: np.ndarray  # [F, 3]
     head_turn: np.ndarray  # [F, 3]
     hand: np.ndarray  # [F, 2, 3] the front of the fist, left and right
-    elbow: np.ndarray  # [F, 2] 0: elbow hangs, 1: elbow out at shoulder height
+    elbow: np.ndarray  # [F, 2] 0: before the ribs, 1: out at shoulder height, -1: behind
     ball: np.ndarray  # [F, 2, 3] the ball of the foot
     foot_turn: np.ndarray  # [F, 2, 2] yaw, and how far the heel is raised about the ball
 
@@ -149,8 +149,10 @@ def pose(targets: Targets) -> tuple[np.ndarray, np.ndarray]:
         # Down, a little out, and ahead: a fist at the chin has its elbow before the ribs.
         hang = np.array([0.3 * sign, -1.0, 0.5])
         out = np.array([1.0 * sign, 0.05, -0.35])
+        behind = np.array([0.35 * sign, -0.2, -1.0])
         e = targets.elbow[:, s : s + 1]
-        pole = rotate(chest, (1 - e) * hang + e * out)
+        up, back = np.clip(e, 0.0, 1.0), np.clip(-e, 0.0, 1.0)
+        pole = rotate(chest, (1 - up - back) * hang + up * out + back * behind)
         upper, lower = _two_bones(
             shoulder,
             targets.hand[:, s],

@@ -72,6 +72,14 @@ class Move:
 
 
 @dataclass(frozen=True)
+class Take:
+    """What one clip shows: moves in this order, or ``count`` of them drawn from a deck."""
+
+    moves: tuple[str, ...]
+    count: int | None = None
+
+
+@dataclass(frozen=True)
 class Style:
     """A way of standing and the moves that begin and end in it."""
 
@@ -81,7 +89,8 @@ class Style:
         str, Vector
     ]  # left, right: ball of the foot (x, z) and its yaw, in the stance frame
     moves: tuple[Move, ...]
-    takes: Mapping[str, tuple[tuple[str, ...], int]]  # name: moves drawn from, how many performed
+    takes: Mapping[str, Take]
+    vault: int = 9  # frames over which the pelvis sinks to let legs reach: few in a gait
     sway: float = 1.0  # how much of the bounce that never stops
     blow_angle: float = 0.0  # deg by which a blow's target is varied to either side
     blow_reach: tuple[float, float] = (0.0, 0.0)  # m nearer and farther

@@ -19,7 +19,6 @@ FPS = 60.0
 SETTLE = 0.10  # s of guard between two moves
 LEAD_IN = 0.5  # s of guard before the first and after the last
 SMOOTHING = 0.022  # s, rounds off what keys leave of corners
-SINK = 9  # frames before and after which the pelvis gives way to legs that would not reach
 SWAY = 0.008  # m of bounce
 
 
@@ -148,14 +147,14 @@ def perform_take(
         turned["chest_turn"],
         turned["head_turn"],
         np.stack([carried["left_hand"], carried["right_hand"]], axis=1),
-        np.clip(place["elbow"], 0.0, 1.0),
+        np.clip(place["elbow"], -1.0, 1.0),
         feet[:, :, :3],
         foot_turn,
     )
     pelvis = targets.pelvis.copy()
     # Lowest within the filter's width, then smoothed: smooth, and nowhere above what legs reach.
-    low = minimum_filter1d(lowered(targets), 2 * SINK + 1, mode="nearest")
-    pelvis[:, 1] = gaussian_filter1d(low, SINK / 3.0, mode="nearest", radius=SINK)
+    low = minimum_filter1d(lowered(targets), 2 * style.vault + 1, mode="nearest")
+    pelvis[:, 1] = gaussian_filter1d(low, style.vault / 3.0, mode="nearest", radius=style.vault)
     root, wxyz = pose(replace(targets, pelvis=pelvis))
     clip = Clip(name, skeleton(), FPS, root, wxyz)
     truth = Truth(on_ground, _strikes(clip, score, starts), _actions(score, starts))
@@ -175,7 +174,7 @@ def _channels(
                 raise unknown(f"channel of {p.move.label}", c, style.guard)
         for c, track in tracks.items():
             rows = p.move.keys.get(c, ())
-            if rows and p.move.holds:
+            if p.move.holds:
                 track.add(start, track.guard)
             blow = 0
             for time, value in rows:
@@ -195,7 +194,7 @@ def _channels(
                     track.add(moment, np.array(value))
                 else:
                     track.add(moment, track.guard + np.array(value))
-            if rows and p.move.holds:
+            if p.move.holds:
                 track.add(end, track.guard)
     for track in tracks.values():
         track.add(total, track.guard)
