@@ -156,7 +156,7 @@ def _to_stand(cycle: Move, label: str) -> Move:
 
 
 _WALK = {"swing": 0.40, "lift": 0.075, "rise": 0.012, "arms": 0.17}
-_RUN = {"swing": 0.64, "lift": 0.21, "rise": -0.03, "arms": 0.20, "bend": 1.0, "toe_off": 42.0, "lean": 9.0}  # fmt: skip
+_RUN = {"swing": 0.64, "lift": 0.21, "rise": -0.03, "arms": 0.16, "bend": 1.0, "toe_off": 42.0, "lean": 9.0}  # fmt: skip
 _GAITS = (
     _gait("walk", 1.08, (0, 1.22, 0), **_WALK),
     _gait("walk_slow", 1.24, (0, 0.95, 0), swing=0.38, lift=0.065, rise=0.009, arms=0.11, toe_off=22),
