@@ -54,7 +54,7 @@ def _gait(
     def hand(sign: float, at: float) -> tuple[float, float, float]:
         """A hand of the left (+1) or right side, ``at`` -1 behind to 1 ahead."""
         x = 0.255 - 0.07 * bend
-        y = 0.785 + 0.34 * bend + 0.07 * bend * at + 0.025 * at**2
+        y = 0.785 + 0.30 * bend + 0.07 * bend * at + 0.025 * at**2
         return (sign * x, y, 0.07 + 0.16 * bend + arms * at + ahead)
 
     return Move(
@@ -124,7 +124,11 @@ def _from_stand(cycle: Move, label: str) -> Move:
         label,
         "transition",
         t,
-        {"pelvis": ((0.3 * t, (-0.02, -0.01, 0.015)),)},
+        {
+            "pelvis": ((0.3 * t, (-0.02, -0.01, 0.015)),),
+            # The arms are where they swing through before they begin to swing.
+            **{c: ((0.7 * t, cycle.keys[c][1][1]),) for c in ("left_hand", "right_hand")},
+        },
         (
             Step("left", 0.16 * t, 0.50 * t, 0.7 * high, True),
             Step("right", 0.58 * t, t - 0.001, 0.9 * high, True),
@@ -156,7 +160,7 @@ def _to_stand(cycle: Move, label: str) -> Move:
 
 
 _WALK = {"swing": 0.40, "lift": 0.075, "rise": 0.012, "arms": 0.17}
-_RUN = {"swing": 0.64, "lift": 0.21, "rise": -0.03, "arms": 0.16, "bend": 1.0, "toe_off": 42.0, "lean": 9.0}  # fmt: skip
+_RUN = {"swing": 0.64, "lift": 0.21, "rise": -0.03, "arms": 0.20, "bend": 1.0, "toe_off": 42.0, "lean": 9.0}  # fmt: skip
 _GAITS = (
     _gait("walk", 1.08, (0, 1.22, 0), **_WALK),
     _gait("walk_slow", 1.24, (0, 0.95, 0), swing=0.38, lift=0.065, rise=0.009, arms=0.11, toe_off=22),
@@ -224,6 +228,7 @@ LOCOMOTION = Style(
         ),
         "leaps": Take(("stand", "leap_left", "leap_right", "leap_right", "leap_left"), 14),
     },
-    vault=4,
+    vault=7,
+    hands_sink=1.0,
     sway=0.25,
 )  # fmt: skip

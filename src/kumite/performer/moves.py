@@ -91,6 +91,7 @@ class Style:
     moves: tuple[Move, ...]
     takes: Mapping[str, Take]
     vault: int = 9  # frames over which the pelvis sinks to let legs reach: few in a gait
+    hands_sink: float = 0.0  # share of that sinking that hands go along with
     sway: float = 1.0  # how much of the bounce that never stops
     blow_angle: float = 0.0  # deg by which a blow's target is varied to either side
     blow_reach: tuple[float, float] = (0.0, 0.0)  # m nearer and farther

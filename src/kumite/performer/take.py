@@ -155,7 +155,9 @@ def perform_take(
     # Lowest within the filter's width, then smoothed: smooth, and nowhere above what legs reach.
     low = minimum_filter1d(lowered(targets), 2 * style.vault + 1, mode="nearest")
     pelvis[:, 1] = gaussian_filter1d(low, style.vault / 3.0, mode="nearest", radius=style.vault)
-    root, wxyz = pose(replace(targets, pelvis=pelvis))
+    hand = targets.hand.copy()
+    hand[:, :, 1] += style.hands_sink * (pelvis[:, 1] - targets.pelvis[:, 1])[:, None]
+    root, wxyz = pose(replace(targets, pelvis=pelvis, hand=hand))
     clip = Clip(name, skeleton(), FPS, root, wxyz)
     truth = Truth(on_ground, _strikes(clip, score, starts), _actions(score, starts))
     return clip, truth
