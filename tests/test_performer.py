@@ -168,7 +168,7 @@ def test_motion_is_continuous(performance: Performance):
         change = np.linalg.norm(np.diff(spin, axis=0), axis=-1)
         assert np.quantile(change, 0.999) < 12.0, clip.name  # rad/s from frame to frame
         root = np.linalg.norm(np.diff(clip.root_position, 2, axis=0), axis=1) * FPS**2
-        assert root.max() < 40.0, clip.name
+        assert root.max() < 45.0, clip.name  # m/s²: a leap pushes off with four times its weight
 
 
 def test_enough_lift_offs_to_join_at(boxing: Performance):
