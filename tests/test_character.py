@@ -11,6 +11,7 @@ from kumite import rotation
 from kumite.clip import SIDES, forward_kinematics
 from kumite.graph import Library
 from kumite.kernels import character as kernels
+from kumite.kernels import pose
 from kumite.synthesis import Cast
 from tests import toys
 
@@ -61,6 +62,64 @@ def test_two_bone_reach(seed):
         assert np.dot(again[foot] - again[hip], goal - again[hip]) > 0
     others = [j for j in range(len(s)) if j not in (knee, foot, s.joint("left_toe"))]
     assert np.allclose(again[others], position[others], atol=1e-12)
+
+
+@pytest.mark.jit_off
+def test_a_straight_leg_bends_its_knee_forward():
+    s = toys.skeleton()
+    straight = s.offsets.copy()
+    straight[:, 2] = 0.0
+    wxyz = np.tile([1.0, 0.0, 0.0, 0.0], (len(s), 1))
+    root = np.array([0.0, toys.HIP_HEIGHT, 0.0])
+    position, world = (np.empty((len(s), n)) for n in (3, 4))
+    pose.forward_kinematics_frame(s.parents, straight, root, wxyz, position, world)
+    hip, knee, foot = (s.joint(f"right_{p}") for p in ("thigh", "shin", "foot"))
+    goal = position[foot] + [0.0, 0.2, 0.0]
+    kernels.reach(hip, knee, foot, goal, s.parents, straight, root, wxyz, position, world)
+    assert np.allclose(position[foot], goal, atol=1e-5)
+    assert position[knee, 2] > 0.2
+
+
+@pytest.mark.jit_off
+@pytest.mark.parametrize("seed", range(5))
+def test_what_is_shown_goes_on_through_a_join(seed):
+    """Place and velocity of the root and the ankles, turns of the joints, at any two frames."""
+    rng = np.random.default_rng(seed)
+    fps, at, to, joints = 30.0, 1, 4, 3
+    clip = np.array([0, 0, 0, 1, 1, 1], np.int32)
+    root, facing = rng.normal(0, 1, (2, 6, 3))
+    ankle = rng.normal(0, 1, (6, 2, 3))
+    wxyz = rotation.exp(rng.normal(0, 0.5, (6, joints, 3)))
+    anchor = rng.normal(0, 1, 3)
+    offset, spin = rng.normal(0, 0.3, (2, joints, 3))
+    root_offset, root_velocity = rng.normal(0, 0.3, (2, 3))
+    foot_offset, foot_velocity = rng.normal(0, 0.3, (2, 2, 3))
+
+    def shown(frame: int):
+        past = [rotation.planar_apply(anchor, p[frame - 1]) for p in (root, ankle)]
+        now = [rotation.planar_apply(anchor, p[frame]) for p in (root, ankle)]
+        base = wxyz[frame].copy()
+        base[0] = rotation.multiply(rotation.from_yaw(anchor[2]), base[0])
+        turned = rotation.multiply(base, rotation.exp(offset))
+        return (
+            now[0] + root_offset,
+            (now[0] - past[0]) * fps + root_velocity,
+            now[1] + foot_offset,
+            (now[1] - past[1]) * fps + foot_velocity,
+            turned * np.sign(turned[:, :1]),
+        )
+
+    before = shown(at)
+    stood = rotation.planar_compose(anchor, facing[at])
+    kernels.join(
+        anchor, at, to, fps, root, wxyz, facing, ankle, clip,
+        offset, spin, root_offset, root_velocity, foot_offset, foot_velocity,
+    )  # fmt: skip
+    for a, b in zip(before, shown(to)):
+        assert np.allclose(a, b, atol=1e-9)
+    stands = rotation.planar_compose(anchor, facing[to])
+    assert np.allclose(stood[:2], stands[:2])
+    assert rotation.wrap_angle(stood[2] - stands[2]) == pytest.approx(0, abs=1e-9)
 
 
 def _walk(library: Library, frames: int, seed: int):

@@ -66,6 +66,16 @@ def planar_point(t, x, z):
 
 
 @kernel
+def add_movement(point, first, last, anchor, scale, out):
+    """Add to ``out`` [3] how a library point [F, 3] moves from frame to frame, in the scene."""
+    x0, z0 = planar_point(anchor, point[first, 0], point[first, 2])
+    x1, z1 = planar_point(anchor, point[last, 0], point[last, 2])
+    out[0] += scale * (x1 - x0)
+    out[1] += scale * (point[last, 1] - point[first, 1])
+    out[2] += scale * (z1 - z0)
+
+
+@kernel
 def wrap(angle):
     return angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
 
@@ -121,6 +131,7 @@ def join(
     root_offset,
     root_offset_velocity,
     foot_offset,
+    foot_velocity,
 ):
     """Move one character from frame_from to frame_to = j - 1, which it resembles, in place.
 
@@ -155,17 +166,12 @@ def join(
             offset_velocity[j, c] += (v[c] - w[c]) * fps
     for c in range(3):
         root_offset[c] += p_from[c] - p_to[c]
-        v[c] = library_root[frame_from, c] - library_root[past_from, c]
-        w[c] = library_root[frame_to, c] - library_root[past_to, c]
-    spin = np.zeros(3)
-    spin[2] = before[2]
-    vx, vz = planar_point(spin, v[0], v[2])
-    spin[2] = anchor[2]
-    wx, wz = planar_point(spin, w[0], w[2])
-    root_offset_velocity[0] += (vx - wx) * fps
-    root_offset_velocity[1] += (v[1] - w[1]) * fps
-    root_offset_velocity[2] += (vz - wz) * fps
+    add_movement(library_root, past_from, frame_from, before, fps, root_offset_velocity)
+    add_movement(library_root, past_to, frame_to, anchor, -fps, root_offset_velocity)
     for f in range(2):
+        ankle = library_ankle[:, f]
+        add_movement(ankle, past_from, frame_from, before, fps, foot_velocity[f])
+        add_movement(ankle, past_to, frame_to, anchor, -fps, foot_velocity[f])
         x0, z0 = planar_point(
             before, library_ankle[frame_from, f, 0], library_ankle[frame_from, f, 2]
         )
@@ -224,8 +230,8 @@ def reach(upper, middle, end, goal, parents, offsets, root, wxyz, position, worl
     length = np.sqrt(np.sum(axis**2))
     delta = np.empty(4)
     if length < 1e-6 * a * b:
-        # A straight limb: bend about the joint's own side axis.
-        side = np.array([1.0, 0.0, 0.0])
+        # A straight limb: bend about the joint's own side axis, the knee forward (+Z).
+        side = np.array([-1.0, 0.0, 0.0])
         add_rotated(world_wxyz[middle], side, np.zeros(3), axis)
         length = np.sqrt(np.sum(axis**2))
     exponential(axis * (-bend / length), delta)

@@ -14,9 +14,11 @@ from kumite.kernels import character as kernels
 from kumite.kernels.blow import NO_BLOW
 from kumite.rotation import conjugate, planar_compose, planar_inverse, rotate
 
-JOIN_HALF_LIFE = 0.10  # s, in which half of the difference at a join is gone
+# Of a difference at rest a critically damped spring leaves 60 % after one of its half-lives, 24 %
+# after two, 8 % after three (the exponential of its rate halves twice in each).
+JOIN_HALF_LIFE = 0.10  # s, for the difference of the joints at a join
 ROOT_HALF_LIFE = 0.20  # s, the same for the root: its speed must not be felt to jump
-REACTION_HALF_LIFE = 0.16  # s, in which a struck body recovers half
+REACTION_HALF_LIFE = 0.16  # s, in which a struck body recovers
 LONGEST_FOOT_OFFSET = 0.30  # m that a planted foot may stand away from where the capture has it
 BLOW_BEFORE, BLOW_AFTER = 0.07, 0.12  # s around the effective frames in which a blow may land
 SPINE_SHARES = 3.0  # how much more readily each joint up the spine gives way than the one below
@@ -109,6 +111,7 @@ class Cast:
             self._root_offset[k],
             self._root_offset_velocity[k],
             self._foot_offset[k],
+            self._foot_velocity[k],
         )
         return True
 
