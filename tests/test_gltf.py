@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -155,6 +156,26 @@ def test_the_ball_moves_and_still_joints_are_left_out(recording: Recording, writ
     assert world[ball][0, 0] == pytest.approx(0.2)
     (still,) = (n for n, node in enumerate(document["nodes"]) if node["name"] == "red:spine")
     assert all(c["target"]["node"] != still for c in document["animations"][0]["channels"])
+
+
+def test_a_recording_in_which_nothing_moves(recording: Recording, tmp_path: Path):
+    """A single picture, and bodies that stand still: no animation, and nothing left unused."""
+    one = replace(
+        recording,
+        **{
+            name: getattr(recording, name)[:1]
+            for name in ("root_position", "wxyz", "contacts", "library_frame", "object_position")
+        },
+    )
+    write_glb(tmp_path / "one.glb", one)
+    document, _ = parse(tmp_path / "one.glb")
+    assert not document.get("animations")
+    used = {p[k] for m in document["meshes"] for p in m["primitives"] for k in ("indices",)}
+    used |= {
+        a for m in document["meshes"] for p in m["primitives"] for a in p["attributes"].values()
+    }
+    used |= {s["inverseBindMatrices"] for s in document["skins"]}
+    assert used == set(range(len(document["accessors"])))
 
 
 def test_same_recording_same_bytes(recording: Recording, written: Path, tmp_path: Path):

@@ -7,6 +7,7 @@ turn get no animation channel; a channel's keys are the recording's frames.
 
 from __future__ import annotations
 
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -35,14 +36,13 @@ def write_glb(path: Path | str, recording: Recording) -> None:
     """
     if not (np.isfinite(recording.root_position).all() and np.isfinite(recording.wxyz).all()):
         raise KumiteError(f"{path}: the recording holds values that are not finite")
-    document = _Document(recording.scene)
-    times = document.add_times(len(recording), recording.fps)
+    document = _Document(recording.scene, len(recording), recording.fps)
     mesh = body_mesh(recording.skeleton)
     skin_data = _share_mesh(document, mesh)
     bind = document.add(_inverse_bind(recording.skeleton), gltf.MAT4)
     for k, name in enumerate(recording.names):
-        _add_character(document, recording, k, name, skin_data, bind, times)
-    _add_objects(document, recording, times)
+        _add_character(document, recording, k, name, skin_data, bind)
+    _add_objects(document, recording)
     with files.writing(path) as temporary:
         temporary.write_bytes(document.to_bytes())
 
@@ -50,7 +50,8 @@ def write_glb(path: Path | str, recording: Recording) -> None:
 class _Document:
     """A glTF document and its one buffer, filled from the front."""
 
-    def __init__(self, title: str) -> None:
+    def __init__(self, title: str, frames: int, fps: float) -> None:
+        self._times = (np.arange(frames) / fps).astype(np.float32)
         self._top: list[int] = []
         self.root = gltf.GLTF2(
             asset=gltf.Asset(version="2.0", generator=GENERATOR),
@@ -89,8 +90,10 @@ class _Document:
         self.root.accessors.append(accessor)
         return len(self.root.accessors) - 1
 
-    def add_times(self, frames: int, fps: float) -> int:
-        return self.add((np.arange(frames) / fps).astype(np.float32), gltf.SCALAR, bounds=True)
+    @cached_property
+    def times(self) -> int:
+        """The accessor of the keys' times, which all channels share; none where nothing moves."""
+        return self.add(self._times, gltf.SCALAR, bounds=True)
 
     def add_node(self, node: gltf.Node, *, top: bool = False) -> int:
         self.root.nodes.append(node)
@@ -111,13 +114,13 @@ class _Document:
         )
         return len(self.root.materials) - 1
 
-    def animate(self, node: int, path: str, times: int, values: np.ndarray, kind: str) -> None:
+    def animate(self, node: int, path: str, values: np.ndarray, kind: str) -> None:
         """A linear channel, unless the values never change."""
         if np.ptp(values, axis=0).max() < STILL:
             return
         output = self.add(values.astype(np.float32), kind)
         self.animation.samplers.append(
-            gltf.AnimationSampler(input=times, output=output, interpolation="LINEAR")
+            gltf.AnimationSampler(input=self.times, output=output, interpolation="LINEAR")
         )
         self.animation.channels.append(
             gltf.AnimationChannel(
@@ -172,7 +175,6 @@ def _add_character(
     name: str,
     skin_data: list[tuple[str, dict[str, Any], int]],
     bind: int,
-    times: int,
 ) -> None:
     skeleton = recording.skeleton
     colours = palette(k)
@@ -200,8 +202,8 @@ def _add_character(
                 children=[first + c for c in skeleton.children(j)],
             ),
         )
-        document.animate(first + j, "rotation", times, xyzw[:, j], gltf.VEC4)
-    document.animate(first, "translation", times, recording.root_position[:, k], gltf.VEC3)
+        document.animate(first + j, "rotation", xyzw[:, j], gltf.VEC4)
+    document.animate(first, "translation", recording.root_position[:, k], gltf.VEC3)
 
     # A node of its own above each skeleton keeps importers from merging two into one armature.
     document.add_node(gltf.Node(name=name, children=[first]), top=True)
@@ -225,7 +227,7 @@ def _unit(xyzw: np.ndarray) -> list[float]:
     return (q / np.linalg.norm(q)).tolist()
 
 
-def _add_objects(document: _Document, recording: Recording, times: int) -> None:
+def _add_objects(document: _Document, recording: Recording) -> None:
     if not recording.objects:
         return
     vertices, faces = _sphere()
@@ -253,7 +255,7 @@ def _add_objects(document: _Document, recording: Recording, times: int) -> None:
             ),
             top=True,
         )
-        document.animate(node, "translation", times, recording.object_position[:, o], gltf.VEC3)
+        document.animate(node, "translation", recording.object_position[:, o], gltf.VEC3)
 
 
 def _sphere(rings: int = 12, sectors: int = 20) -> tuple[np.ndarray, np.ndarray]:
