@@ -16,7 +16,7 @@ from kumite.clip import forward_kinematics
 from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.scene import LiveScene, Playback, load_scene, record
-from kumite.studio import Studio, serve
+from kumite.studio import Studio, serve, wording
 from kumite.studio.pace import Pace
 from tests import browser
 
@@ -52,6 +52,13 @@ def test_nothing_listens_beyond_this_machine(library: Library):
         mine = psutil.Process().net_connections(kind="inet")
         listening = {c.laddr.ip for c in mine if c.status == psutil.CONN_LISTEN}
         assert listening == {"127.0.0.1"}
+
+
+def test_a_hit_is_shown_where_it_landed(library: Library):
+    hits = [e for e in record(live(library, "sparring"), 20.0).events if e.kind == "hit"]
+    assert hits
+    assert all(wording.place(e) == e.data["place"] for e in hits)
+    assert all(wording.struck(e) == e.data["victim"] for e in hits)
 
 
 def test_it_ends_by_itself_and_says_where_it_is(library: Library):

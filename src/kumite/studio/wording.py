@@ -35,7 +35,7 @@ def struck(event: Event) -> str | None:
 
 def place(event: Event) -> list[float] | None:
     """Where a hit landed [3] m, if the event says so."""
-    point = _first(event.data, "position", "point", "at")
+    point = _first(event.data, "place", "position", "point", "at")
     if not isinstance(point, Sequence) or isinstance(point, str) or len(point) != 3:
         return None
     return [float(x) for x in point]
