@@ -30,6 +30,15 @@ def test_kinematics_equal_the_matrix_twin():
         assert np.allclose(rotation.to_matrix(world[f]), m, atol=1e-12)
 
 
+def test_many_frames_are_what_few_are(monkeypatch):
+    """The kernel that runs on all cores gives the bytes of the one that does not."""
+    c = wild(50)
+    few = clips.forward_kinematics(c.skeleton, c.root_position, c.wxyz)
+    monkeypatch.setattr(clips.pose_kernels, "MANY", 1)
+    many = clips.forward_kinematics(c.skeleton, c.root_position, c.wxyz)
+    assert all(np.array_equal(a, b) for a, b in zip(few, many))
+
+
 def test_rest_faces_forward_with_the_left_at_plus_x():
     s = toys.skeleton()
     assert np.allclose(s.lateral_axis, [1, 0, 0])

@@ -275,9 +275,9 @@ def forward_kinematics(
     wxyz = np.ascontiguousarray(wxyz, dtype=np.float64)
     position = np.empty((*wxyz.shape[:2], 3))
     world = np.empty(wxyz.shape)
-    pose_kernels.forward_kinematics(
-        skeleton.parents, skeleton.offsets, root_position, wxyz, position, world
-    )
+    many = len(root_position) >= pose_kernels.MANY
+    run = pose_kernels.forward_kinematics_many if many else pose_kernels.forward_kinematics
+    run(skeleton.parents, skeleton.offsets, root_position, wxyz, position, world)
     return position, world
 
 

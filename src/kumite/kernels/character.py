@@ -18,7 +18,7 @@ from kumite.kernels.jit import kernel, parallel_kernel
 from kumite.kernels.pose import add_rotated, forward_kinematics_frame, quaternion_product
 
 TINY = 1e-12
-MANY = 16  # characters from which several threads pay
+MANY = 256  # characters (2 ms of work) from which threads pay, on cores that others use too
 
 
 @kernel

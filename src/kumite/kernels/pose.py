@@ -6,6 +6,8 @@ from numba import prange
 
 from kumite.kernels.jit import kernel, parallel_kernel
 
+MANY = 4000  # frames (2 ms of work) from which threads pay, on cores that others use too
+
 
 @kernel
 def quaternion_product(a, b, out):
@@ -40,9 +42,18 @@ def forward_kinematics_frame(parents, offsets, root_position, wxyz, position, wo
         quaternion_product(world_wxyz[p], wxyz[j], world_wxyz[j])
 
 
-@parallel_kernel
+@kernel
 def forward_kinematics(parents, offsets, root_position, wxyz, position, world_wxyz):
     """All frames: positions [F, J, 3] and world rotations [F, J, 4]."""
+    for f in range(root_position.shape[0]):
+        forward_kinematics_frame(
+            parents, offsets, root_position[f], wxyz[f], position[f], world_wxyz[f]
+        )
+
+
+@parallel_kernel
+def forward_kinematics_many(parents, offsets, root_position, wxyz, position, world_wxyz):
+    """:func:`forward_kinematics` on all cores: worth its start-up from ``MANY`` frames on."""
     for f in prange(root_position.shape[0]):
         forward_kinematics_frame(
             parents, offsets, root_position[f], wxyz[f], position[f], world_wxyz[f]

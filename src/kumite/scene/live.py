@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from kumite.body import lay_body
 from kumite.clip import LIMBS
@@ -217,17 +218,15 @@ class LiveScene:
 
     def _keep_apart(self) -> None:
         """Two bodies that come too near are carried apart, slowly; planted feet stay."""
-        roots = self.cast.root_position
-        most = PUSH_SPEED / self.fps
-        for i in range(len(self.names)):
-            for j in range(i + 1, len(self.names)):
-                gap = roots[j, [0, 2]] - roots[i, [0, 2]]
-                distance = float(np.hypot(*gap))
-                if distance < CLOSEST:
-                    away = gap / distance if distance > 1e-6 else np.array([1.0, 0.0])
-                    push = 0.5 * min(CLOSEST - distance, most) * away
-                    self.cast.shift(i, *(-push))
-                    self.cast.shift(j, *push)
+        ground = self.cast.root_position[:, [0, 2]]
+        near = KDTree(ground).query_pairs(CLOSEST, output_type="ndarray")
+        for i, j in near[np.lexsort(near.T)].tolist():
+            gap = ground[j] - ground[i]
+            distance = float(np.hypot(*gap))
+            away = gap / distance if distance > 1e-6 else np.array([1.0, 0.0])
+            push = 0.5 * min(CLOSEST - distance, PUSH_SPEED / self.fps) * away
+            self.cast.shift(i, *(-push))
+            self.cast.shift(j, *push)
 
     def _measure(self) -> None:
         """Fists and bodies of the pose just made, kept beside those of the one before."""
