@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from kumite import files
 from kumite.clip import tip_positions
 from kumite.errors import KumiteError
 from kumite.graph import Library
@@ -17,6 +18,7 @@ from kumite.scene import (
     LiveScene,
     Playback,
     Recording,
+    SceneSettings,
     builtin_scenes,
     load_recording,
     load_scene,
@@ -24,6 +26,7 @@ from kumite.scene import (
     record,
     save_recording,
 )
+from kumite.scene.live import PUSH_SPEED
 from kumite.scene.metrics import foot_skate, source_skate
 from tests import reference, toys
 
@@ -148,6 +151,46 @@ def test_the_same_seed_gives_the_same_bytes(sparring: LiveScene, tmp_path):
     assert a == b and a != c
 
 
+def test_a_recording_begins_where_the_scene_is(sparring: LiveScene):
+    """A scene that has run before: what happened then is not in the recording."""
+    sparring.reset(1)
+    whole = record(sparring, 10.0)
+    sparring.reset(1)
+    first, second = record(sparring, 5.0), record(sparring, 5.0)
+    cut = len(first) - 1  # the scene's frame that the second begins with
+    assert first.events and second.events
+    rest = whole.events[len(first.events) :][: len(second.events)]
+    assert [(e.frame - cut, e.kind, e.character) for e in rest] == [
+        (e.frame, e.kind, e.character) for e in second.events
+    ]
+    for e in second.events:
+        assert 0 <= e.frame < len(second)
+        if e.kind == "hit":
+            assert e.data["time"] == pytest.approx(e.frame / second.fps, abs=1.1 / second.fps)
+
+
+def test_bodies_on_one_spot_are_carried_apart_slowly(library: Library):
+    name = "abc"
+    settings = SceneSettings.model_validate(
+        {
+            "title": "crowd",
+            "character": [
+                {"name": name[k], "position": (0, 0), "aims_at": name[k - 1]} for k in range(3)
+            ],
+        }
+    )
+    scene = LiveScene(settings, library, seed=0)
+    for _ in range(int(4 * scene.fps)):
+        before = scene.cast.anchor.copy()
+        scene._keep_apart()
+        moved = np.hypot(*(scene.cast.anchor - before)[:, :2].T)
+        assert moved.max() <= PUSH_SPEED / scene.fps + 1e-9  # half of it from each of two others
+        scene.step()
+    ground = scene.root_position[:, [0, 2]]
+    gaps = np.linalg.norm(ground[[0, 1, 2]] - ground[[1, 2, 0]], axis=1)
+    assert gaps.min() > 0.25
+
+
 def test_two_boxers_fight(fight: Recording):
     m = measure(fight)
     assert fight.seconds == 30.0 and m.seconds == 30.0
@@ -249,15 +292,26 @@ def test_recordings_round_trip(fight: Recording, tmp_path):
     assert measure(back) == measure(fight)
 
 
+def test_a_recording_whose_shapes_do_not_fit_is_damaged(fight: Recording, tmp_path):
+    save_recording(tmp_path / "a.rec", fight)
+    header, arrays = files.load(tmp_path / "a.rec", "recording", 1)
+    files.save(tmp_path / "b.rec", "recording", 1, header, {**arrays, "wxyz": arrays["wxyz"][1:]})
+    with pytest.raises(KumiteError, match=r"b\.rec: damaged recording .*wxyz"):
+        load_recording(tmp_path / "b.rec")
+
+
 def test_playback_shows_the_recording(fight: Recording):
     play = Playback(fight)
     frames = 1
     while play.step():
         frames += 1
     assert frames == len(fight)
-    play.seek(10)
-    assert np.allclose(play.wxyz, fight.wxyz[10])
-    assert all(e.frame <= 10 for e in play.events)
+    assert len(play.events) == len(fight.events)
+    for frame in (len(fight) // 2, 10, len(fight) - 1):
+        play.seek(frame)
+        assert np.allclose(play.wxyz, fight.wxyz[frame])
+        assert list(play.events) == [e for e in fight.events if e.frame <= frame]
+    assert play.events is play.events  # asked for at every picture: nothing is copied
 
 
 def test_one_character_alone(fight: Recording):

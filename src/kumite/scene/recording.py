@@ -172,7 +172,7 @@ def load_recording(path: Path | str) -> Recording:
             settings=header["settings"],
             **arrays,
         )
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, KumiteError) as error:
         raise KumiteError(f"{path}: damaged recording ({error})") from None
 
 

@@ -9,13 +9,17 @@ import numpy as np
 from kumite.errors import KumiteError
 from kumite.scene.live import LiveScene
 from kumite.scene.metrics import source_skate
-from kumite.scene.recording import Recording
+from kumite.scene.recording import Event, Recording
 
 
 def record(
     scene: LiveScene, seconds: float, progress: Callable[[float], None] = lambda share: None
 ) -> Recording:
-    """Step a scene for a time [s] and keep every frame and event. progress is told 0..1."""
+    """Step a scene for a time [s] and keep every frame and event. progress is told 0..1.
+
+    A scene that has run before goes on from where it is; its earlier events are left out, and times
+    count from the recording's first frame.
+    """
     if not (np.isfinite(seconds) and seconds > 0):
         raise KumiteError(f"seconds: {seconds}, expected more than 0")
     frames = max(1, round(seconds * scene.fps))
@@ -25,6 +29,7 @@ def record(
     contacts = np.empty((frames, count, 2), bool)
     shown = np.empty((frames, count), np.int32)
     things = np.empty((frames, len(scene.objects), 3), np.float32)
+    begin, seen = scene.frame, len(scene.events)
     for f in range(frames):
         if f:
             scene.step()
@@ -48,7 +53,7 @@ def record(
         library_frame=shown,
         objects=tuple(thing.name for thing in scene.objects),
         object_position=things,
-        events=tuple(scene.events),
+        events=tuple(_counted_from(begin, e, scene.fps) for e in scene.events[seen:]),
         settings={
             "seed": scene.seed,
             "library": scene.library.digest,
@@ -58,3 +63,11 @@ def record(
             "scene": scene.settings.model_dump(mode="json"),
         },
     )
+
+
+def _counted_from(begin: int, event: Event, fps: float) -> Event:
+    """An event as it is told by a recording that begins at a frame of the scene."""
+    data = dict(event.data)
+    if begin and "time" in data:
+        data["time"] = round(data["time"] - begin / fps, 4)
+    return Event(event.frame - begin, event.kind, event.character, data)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -75,6 +76,9 @@ class Playback:
 
     def __init__(self, recording: Recording) -> None:
         self.recording = recording
+        self._all_events = sorted(recording.events, key=lambda e: e.frame)
+        self._event_frames = [e.frame for e in self._all_events]
+        self._events: list[Event] = []
         self.title = recording.scene
         self.fps = recording.fps
         self.skeleton = recording.skeleton
@@ -111,5 +115,9 @@ class Playback:
         """Nothing can be moved in a recording."""
 
     @property
-    def events(self) -> list[Event]:
-        return [e for e in self.recording.events if e.frame <= self.frame]
+    def events(self) -> Sequence[Event]:
+        # Asked for at every picture: bisected, and the last one handed out again while it holds.
+        count = bisect_right(self._event_frames, self.frame)
+        if count != len(self._events):
+            self._events = self._all_events[:count]
+        return self._events
