@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from kumite import rotation
 from kumite.annotate import find_contacts
 from kumite.clip import Clip, concatenate
+from kumite.errors import KumiteError
 from kumite.graph import distance as graph_distance
 from kumite.graph import find_transitions, pose_features
 from kumite.kernels import distance as kernels
@@ -80,6 +81,13 @@ def test_where_a_body_stands_and_faces_does_not_count_but_height_and_lean_do():
     assert line[0, 1] == pytest.approx(0, abs=1e-5)
     expected = 0.3**2 + (0.1 * graph_distance.HEIGHT_WEIGHT) ** 2
     assert line[0, 2] == pytest.approx(expected, rel=1e-3)
+
+
+def test_poses_that_are_all_alike_come_to_an_end():
+    """A long still take: all distances are 0, so no sample of them says what to accept."""
+    clips = toys.clip_set([4100])
+    with pytest.raises(KumiteError, match="no two poses are alike"):
+        find_transitions(clips, find_contacts(clips), event="none")
 
 
 def test_joins_need_the_same_event():

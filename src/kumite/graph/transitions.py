@@ -24,6 +24,7 @@ PER_SECOND = 52.0  # wanted transitions per second of capture: the paper's 27,07
 LARGEST_SHARE = 0.2  # of the pairs at an event: the paper's share is 0.14
 FEWEST = 3  # ways in and out that a rare pose keeps at an event …
 STRETCH_LIMIT = 1.7  # … if they cost no more than this times the threshold
+LEAST_LIMIT, MOST_LIMIT = 1e-3, 1e3  # rad²; what a second guess begins with, and where it ends
 _ROOM = 4096  # first guess of local minima a task
 
 
@@ -127,7 +128,7 @@ def _local_minima(
     tasks = (count + kernels.ROWS - 1) // kernels.ROWS
     limit = np.float32(np.inf)
     if count > 4000:
-        limit = _limit_from_sample(features, joined, group, wanted)
+        limit = _limit_from_sample(features, wanted)
     room = _ROOM
     while True:
         found_a = np.empty((tasks, room), dtype=np.int32)
@@ -150,17 +151,18 @@ def _local_minima(
             if np.isinf(limit) or counts.sum() >= wanted:
                 used = np.arange(room)[None, :] < counts[:, None]
                 return found_a[used], found_b[used], found_d[used]
-            limit = np.float32(limit * 4)  # the sample was too hopeful
+            # The sample was too hopeful; where captures repeat or stand still it may even say 0.
+            higher = max(16.0 * float(limit), LEAST_LIMIT)
+            limit = np.float32(higher if higher < MOST_LIMIT else np.inf)
         else:
             room = int(counts.max())
 
 
-def _limit_from_sample(
-    features: PoseFeatures, joined: np.ndarray, group: np.ndarray, wanted: int
-) -> np.float32:
+def _limit_from_sample(features: PoseFeatures, wanted: int) -> np.float32:
     """A distance below which about twice the wanted number of local minima lies.
 
-    Measured on a few runs of rows spread over the poses, so that memory stays small.
+    Measured on a few runs of rows spread over the poses, so that memory stays small; clip borders
+    and groups are left out of account.
     """
     count = features.quaternion.shape[2]
     runs = np.linspace(0, count - 17, 24).astype(int)
