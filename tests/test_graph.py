@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kumite.annotate import find_contacts, find_strikes
+from kumite import files
+from kumite.annotate import Contacts, find_contacts, find_strikes
 from kumite.clip import Clip, concatenate
 from kumite.errors import KumiteError
 from kumite.graph import Library, Transitions, build_library, fold, load_library, save_library
@@ -128,6 +129,36 @@ def test_a_library_with_shapes_that_do_not_fit_is_damaged(library: Library, tmp_
     save_library(path, replace(library, clips=clips))
     with pytest.raises(KumiteError, match="damaged library"):
         load_library(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("table.stretch", 10**6, "an action without a stretch"),
+        ("table.target", -1, "a stretch that ends in no state"),
+        ("table.first", 0, "a stretch without frames"),
+        ("table.action_start", 0, "a state without actions"),
+        ("table.displacement", np.nan, "a displacement that is not finite"),
+        ("strikes.limb", 4, "a blow lies outside the frames or the limbs"),
+    ],
+)
+def test_a_library_whose_numbers_point_nowhere_is_damaged(
+    library: Library, tmp_path, name, value, message
+):
+    """Kernels follow them without looking: unchecked, they end the process."""
+    save_library(tmp_path / "a.kumite", library)
+    header, arrays = files.load(tmp_path / "a.kumite", "library", 1)
+    wrong = arrays[name].copy()
+    wrong[len(wrong) // 2] = value
+    files.save(tmp_path / "b.kumite", "library", 1, header, {**arrays, name: wrong})
+    with pytest.raises(KumiteError, match=f"b.kumite: damaged library .*{message}"):
+        load_library(tmp_path / "b.kumite")
+
+
+def test_notes_that_do_not_fit_the_clips_are_refused(library: Library):
+    fewer = Contacts(library.contacts.on_ground[1:], library.contacts.resting_height)
+    with pytest.raises(KumiteError, match="contacts of .* frames, clips of"):
+        replace(library, contacts=fewer)
 
 
 def test_building_twice_gives_the_same_library(library: Library):

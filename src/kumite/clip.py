@@ -46,6 +46,18 @@ def _frozen(array: np.ndarray, dtype: type) -> np.ndarray:
     return out
 
 
+def freeze(record: object, what: str, **fields: tuple[type, tuple[int, ...]]) -> None:
+    """Give a frozen dataclass' arrays their dtype and make them read-only, in place.
+
+    fields: name=(dtype, shape). Errors: a shape that does not fit, told as ``what``'s.
+    """
+    for name, (dtype, shape) in fields.items():
+        array = _frozen(getattr(record, name), dtype)
+        if array.shape != shape:
+            raise KumiteError(f"{what}: {name} is {list(array.shape)}, expected {list(shape)}")
+        object.__setattr__(record, name, array)
+
+
 @dataclass(frozen=True)
 class Skeleton:
     """A tree of joints with rigid bones, parents before children."""

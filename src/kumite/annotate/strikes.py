@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kumite.annotate.contacts import velocity
-from kumite.clip import LIMBS, ClipSet, tip_positions
+from kumite.clip import LIMBS, ClipSet, freeze, tip_positions
 from kumite.errors import KumiteError
 from kumite.rotation import planar_apply, planar_inverse
 
@@ -33,6 +33,24 @@ class Strikes:
     stop: np.ndarray  # [X] int32, one past the last
     limb: np.ndarray  # [X] int32, index into clip.LIMBS
     velocity: np.ndarray  # [X, 3] m/s of the tip, in the facing frame of ``frame``
+
+    def __post_init__(self) -> None:
+        frames, blows, limbs = len(self.effective), len(self.frame), len(LIMBS)
+        freeze(
+            self,
+            "strikes",
+            effective=(np.bool_, (frames, limbs)),
+            tip=(float, (frames, limbs, 3)),
+            speed=(float, (frames, limbs)),
+            frame=(np.int32, (blows,)),
+            start=(np.int32, (blows,)),
+            stop=(np.int32, (blows,)),
+            limb=(np.int32, (blows,)),
+            velocity=(float, (blows, 3)),
+        )
+        inside = (self.start >= 0) & (self.start <= self.frame) & (self.frame < self.stop)
+        if not np.all(inside & (self.stop <= frames) & (self.limb >= 0) & (self.limb < limbs)):
+            raise KumiteError("strikes: a blow lies outside the frames or the limbs")
 
     def __len__(self) -> int:
         return len(self.frame)

@@ -50,11 +50,6 @@ class Skill:
     strike: Policy
     tracks: Tracks
 
-    @property
-    def horizon(self) -> int:
-        """Frames of the longest action: how far ahead a target's place can matter."""
-        return int(self.library.table.duration.max())
-
 
 @dataclass
 class Fighter:

@@ -38,6 +38,19 @@ class Library:
     table: ActionTable
     report: dict[str, Any] = field(default_factory=dict)  # how it was built, JSON values
 
+    def __post_init__(self) -> None:
+        frames = len(self.clips)
+        for what, found in (
+            ("contacts", len(self.contacts.on_ground)),
+            ("strikes", len(self.strikes.effective)),
+        ):
+            if found != frames:
+                raise KumiteError(f"library: {what} of {found} frames, clips of {frames}")
+        first, last = self.table.first - 1, self.table.last  # actions enter at first - 1
+        clip = self.clips.clip_of_frame
+        if np.any(last >= frames) or np.any(clip[first] != clip[last]):
+            raise KumiteError("library: an action leaves its clip")
+
     @cached_property
     def digest(self) -> str:
         """16 hex digits that name the content: what is computed from it is cached under them."""

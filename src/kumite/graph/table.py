@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kumite.clip import ClipSet
+from kumite.clip import ClipSet, freeze
 from kumite.errors import KumiteError
 from kumite.graph.transitions import Transitions
 from kumite.rotation import planar_compose, planar_inverse
@@ -35,6 +35,36 @@ class ActionTable:
         np.ndarray
     )  # [L, 3] (x, z, yaw) from the facing frame of first - 1 to that of last
 
+    def __post_init__(self) -> None:
+        states, actions, stretches = len(self.state_frame), len(self.stretch), len(self.first)
+        freeze(
+            self,
+            "action table",
+            state_frame=(np.int32, (states,)),
+            action_start=(np.int32, (states + 1,)),
+            stretch=(np.int32, (actions,)),
+            join_cost=(np.float32, (actions,)),
+            first=(np.int32, (stretches,)),
+            last=(np.int32, (stretches,)),
+            target=(np.int32, (stretches,)),
+            displacement=(float, (stretches, 3)),
+        )
+        # Kernels follow these numbers without looking: one that is out of range must not get there.
+        for what, fits in (
+            ("a state without actions", np.all(np.diff(self.action_start) >= 1)),
+            ("actions that no state has", self.action_start[[0, -1]].tolist() == [0, actions]),
+            ("an action without a stretch", _within(self.stretch, stretches)),
+            ("a stretch without frames", np.all((self.first >= 1) & (self.first <= self.last))),
+            (
+                "a stretch that ends in no state",
+                _within(self.target, states)
+                and np.array_equal(self.state_frame[self.target], self.last),
+            ),
+            ("a displacement that is not finite", np.all(np.isfinite(self.displacement))),
+        ):
+            if not fits:
+                raise KumiteError(f"action table: {what}")
+
     @property
     def duration(self) -> np.ndarray:
         """Frames [L] that each stretch lasts."""
@@ -51,9 +81,10 @@ class ActionTable:
     def actions_of(self, state: int) -> slice:
         return slice(int(self.action_start[state]), int(self.action_start[state + 1]))
 
-    def state_of_action(self) -> np.ndarray:
-        """The state [A] that each action leaves."""
-        return np.repeat(np.arange(self.states, dtype=np.int32), np.diff(self.action_start))
+
+def _within(index: np.ndarray, count: int) -> bool:
+    """Whether all of an index point into ``count`` things."""
+    return bool(np.all((index >= 0) & (index < count)))
 
 
 def fold(clips: ClipSet, transitions: Transitions, kept: np.ndarray) -> ActionTable:
