@@ -157,7 +157,7 @@ def test_a_library_whose_numbers_point_nowhere_is_damaged(
 
 def test_notes_that_do_not_fit_the_clips_are_refused(library: Library):
     fewer = Contacts(library.contacts.on_ground[1:], library.contacts.resting_height)
-    with pytest.raises(KumiteError, match="contacts of .* frames, clips of"):
+    with pytest.raises(KumiteError, match=r"contacts of \d+ frames, clips of"):
         replace(library, contacts=fewer)
 
 
