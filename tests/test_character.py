@@ -242,6 +242,21 @@ def test_a_struck_head_gives_way_along_the_blow_and_recovers(library: Library):
     assert np.allclose(cast.position[0, feet], rest[feet], atol=2e-3)
 
 
+def test_a_waist_that_the_pelvis_carries_gives_way_too(library: Library):
+    cast = Cast(library, 1)
+    cast.place(0, 0, np.zeros(3))
+    cast.show(0.0)
+    skeleton = library.clips.skeleton
+    pelvis, head = skeleton.joint("pelvis"), skeleton.joint("head")
+    rest = cast.position[0, head].copy()
+    cast.strike(0, pelvis, cast.position[0, pelvis] + [0, 0.2, 0], np.array([0.03, 0.0, 0.0]))
+    moved = []
+    for _ in range(30):
+        cast.show(1 / 60)
+        moved.append(cast.position[0, head, 0] - rest[0])
+    assert max(moved) > 0.03
+
+
 def test_many_characters_are_what_few_are(library: Library):
     """The kernel that runs on all cores gives the bytes of the one that does not."""
     few, many = Cast(library, 1), Cast(library, kernels.MANY + 3)

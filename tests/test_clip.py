@@ -39,6 +39,18 @@ def test_many_frames_are_what_few_are(monkeypatch):
     assert all(np.array_equal(a, b) for a, b in zip(few, many))
 
 
+def test_the_trunk_leads_from_the_pelvis_or_from_the_root_beside_it():
+    s = toys.skeleton()
+    names = [s.names[j] for j in s.trunk(s.joint("head"))]
+    assert names == ["spine", "chest", "head"]
+    assert s.trunk(s.joint("pelvis")) == []
+    # The pelvis as a branch that carries the legs alone: the spine hangs on the root.
+    beside = clips.Skeleton(
+        s.names, s.parents, s.offsets, {**s.roles, "pelvis": s.joint("left_thigh")}
+    )
+    assert [s.names[j] for j in beside.trunk(s.joint("head"))] == names
+
+
 def test_rest_faces_forward_with_the_left_at_plus_x():
     s = toys.skeleton()
     assert np.allclose(s.lateral_axis, [1, 0, 0])

@@ -66,15 +66,20 @@ def test_local_minima_equal_the_twin(seed, count, groups, limit):
     assert found == expected
 
 
-def test_where_a_body_stands_and_faces_does_not_count_but_height_and_lean_do():
+@pytest.mark.parametrize("moved", ["root", "reference above the hips", "hips below a reference"])
+def test_where_a_body_stands_and_faces_does_not_count_but_height_and_lean_do(moved):
     c = toys.still(3)
-    wxyz, root = c.wxyz.copy(), c.root_position.copy()
-    wxyz[1, 0] = rotation.from_yaw(1.0)
+    s = c.skeleton if moved == "root" else toys.with_reference(c.skeleton)
+    turned = 1 if moved.startswith("hips") else 0
+    wxyz, root = np.tile([1.0, 0.0, 0.0, 0.0], (3, len(s), 1)), c.root_position.copy()
+    wxyz[1, turned] = rotation.from_yaw(1.0)
     root[1] += [3, 0, -2]
-    wxyz[2, 0] = rotation.multiply(rotation.from_yaw(1.0), rotation.from_axis_angle([1, 0, 0], 0.3))
+    wxyz[2, turned] = rotation.multiply(
+        rotation.from_yaw(1.0), rotation.from_axis_angle([1, 0, 0], 0.3)
+    )
     root[2, 1] -= 0.1
     # One-frame clips: no velocities come into it.
-    clips = [Clip(f"c{i}", c.skeleton, 30, root[i : i + 1], wxyz[i : i + 1]) for i in range(3)]
+    clips = [Clip(f"c{i}", s, 30, root[i : i + 1], wxyz[i : i + 1]) for i in range(3)]
     f = pose_features(concatenate(clips))
     line = np.empty((3 + kernels.LANES, 3), np.float32)
     kernels.distance_rows(f.quaternion, f.weight, f.euclidean, 0, 3, line)

@@ -46,6 +46,18 @@ def skeleton() -> Skeleton:
     )
 
 
+def with_reference(s: Skeleton) -> Skeleton:
+    """The same body below a root that has no role."""
+    return Skeleton(
+        ("reference", *s.names),
+        np.concatenate([[-1], s.parents + 1]),
+        np.concatenate([np.zeros((1, 3)), s.offsets]),
+        {role: joint + 1 for role, joint in s.roles.items()},
+        s.tip_parents + 1,
+        s.tip_offsets,
+    )
+
+
 def still(frames: int, *, name: str = "still", fps: float = 30.0, yaw: float = 0.0) -> Clip:
     """A clip that stands, arms out."""
     s = skeleton()

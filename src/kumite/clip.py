@@ -126,6 +126,16 @@ class Skeleton:
             joint = int(self.parents[joint])
         return path[::-1]
 
+    def trunk(self, joint: int) -> list[int]:
+        """Joints from just below the pelvis down to ``joint``; from just below the root where the
+        pelvis is a branch of its own.
+        """
+        pelvis, path = self.joint("pelvis"), []
+        while joint not in (pelvis, 0):
+            path.append(joint)
+            joint = int(self.parents[joint])
+        return path[::-1]
+
     @cached_property
     def rest_positions(self) -> np.ndarray:
         """Joint positions [J, 3] with no joint turned and the root at the origin."""

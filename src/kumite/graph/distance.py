@@ -52,7 +52,7 @@ def joint_weights(clips: ClipSet) -> np.ndarray:
     """Weight [J] of each joint of the skeleton."""
     skeleton = clips.skeleton
     weight = np.zeros(len(skeleton))
-    for j in skeleton.chain(skeleton.joint("pelvis"), skeleton.joint("chest")):
+    for j in skeleton.trunk(skeleton.joint("chest")):
         weight[j] = JOINT_WEIGHTS["spine"]
     for role, joint in skeleton.roles.items():
         weight[joint] = JOINT_WEIGHTS.get(role.removeprefix("left_").removeprefix("right_"), 0.0)
@@ -65,25 +65,31 @@ def pose_features(clips: ClipSet) -> PoseFeatures:
     weight = joint_weights(clips)
     used = np.flatnonzero(weight > 0)
     yaw = clips.facing[:, 2]
-    local = clips.wxyz.copy()
-    local[:, 0] = multiply(from_yaw(-yaw), clips.wxyz[:, 0])
+    # The pelvis is compared as it stands in the world, whatever joints above it carry.
+    pelvis = skeleton.joint("pelvis")
+    position, world = clips.world
+    hips = position[:, pelvis]
+    wxyz = clips.wxyz.copy()
+    wxyz[:, pelvis] = world[:, pelvis]
+    local = wxyz.copy()
+    local[:, pelvis] = multiply(from_yaw(-yaw), wxyz[:, pelvis])
     spin = np.zeros((len(clips), len(skeleton), 3))  # rad/s, joint axes
-    drift = np.zeros((len(clips), 3))  # m/s of the root, facing frame
+    drift = np.zeros((len(clips), 3))  # m/s of the pelvis, facing frame
     for a, b in zip(clips.clip_start[:-1], clips.clip_start[1:]):
         if b - a < 2:
             continue
         # Backward differences: what the eye has just seen, and what a join must carry on.
-        step = log(multiply(conjugate(clips.wxyz[a : b - 1]), clips.wxyz[a + 1 : b]))
+        step = log(multiply(conjugate(wxyz[a : b - 1]), wxyz[a + 1 : b]))
         spin[a + 1 : b] = step * clips.fps
         spin[a] = spin[a + 1]
-        moved = np.diff(clips.root_position[a:b], axis=0) * clips.fps
+        moved = np.diff(hips[a:b], axis=0) * clips.fps
         turn = np.zeros((b - a - 1, 3))
         turn[:, 2] = -yaw[a + 1 : b]
         drift[a + 1 : b] = planar_apply(turn, moved)
         drift[a] = drift[a + 1]
     scale = VELOCITY_HORIZON * np.sqrt(weight[used])
     parts = [
-        HEIGHT_WEIGHT * clips.root_position[:, 1][None],
+        HEIGHT_WEIGHT * hips[:, 1][None],
         HEIGHT_WEIGHT * VELOCITY_HORIZON * drift.T,
         (spin[:, used] * scale[None, :, None]).reshape(len(clips), -1).T,
     ]

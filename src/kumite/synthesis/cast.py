@@ -168,9 +168,7 @@ class Cast:
         critically damped spring that peaks there.
         """
         skeleton = self.library.clips.skeleton
-        chain = skeleton.chain(skeleton.joint("pelvis"), joint)
-        if not chain:
-            return
+        chain = skeleton.trunk(joint) or [joint]  # a waist may be the pelvis itself
         arms = point - self.position[k, chain]
         length2 = np.sum(arms**2, axis=1)
         share = SPINE_SHARES ** np.arange(len(chain)) * length2
