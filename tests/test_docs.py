@@ -15,8 +15,8 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("", ".mocap", ".performer", ".annotate", ".body", ".graph", ".synthesis", ".control")
 
 
-def blocks(language: str) -> list[str]:
-    text = (ROOT / "README.md").read_text("utf-8")
+def blocks(language: str, document: str = "README.md") -> list[str]:
+    text = (ROOT / document).read_text("utf-8")
     return re.findall(rf"```{language}\n(.*?)```", text, flags=re.DOTALL)
 
 
@@ -33,8 +33,9 @@ def test_examples_run(example: str, tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_the_readmes_python_runs(tmp_path: Path):
-    code = "\n".join(blocks("python"))
+@pytest.mark.parametrize("document", ["README.md", "docs/performer.md"])
+def test_the_documents_python_runs(document: str, tmp_path: Path):
+    code = "\n".join(blocks("python", document))
     assert code
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=300
@@ -71,6 +72,13 @@ def test_public_names_can_be_imported(package: str):
     for name in names:
         assert getattr(module, name) is not None
     assert module.__doc__
+
+
+@pytest.mark.parametrize("document", sorted(p.name for p in (ROOT / "docs").glob("*.md")))
+def test_files_that_documents_show_are_there(document: str):
+    text = (ROOT / "docs" / document).read_text("utf-8")
+    for target in re.findall(r"\]\((?!http)([^)#]+)\)", text):
+        assert (ROOT / "docs" / target).exists(), target
 
 
 def test_files_that_the_readme_shows_are_there():

@@ -1,0 +1,45 @@
+"""Contact sheets of every clip of the built-in performer, into docs/: a row a clip.
+
+python benchmarks/performer_sheets.py
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from kumite import performer
+from kumite.export.sheet import contact_sheet
+
+COLUMNS = 12
+FOLDER = Path(__file__).parents[1] / "docs"
+
+
+def main() -> None:
+    for style in performer.STYLES:
+        performance = performer.perform(style)
+        root, wxyz, labels = [], [], []
+        for clip, truth in zip(performance.clips, performance.truth):
+            # From the moves themselves, evenly over the clip's beginning: a quarter second apart.
+            first = truth.actions[0].start
+            frames = np.minimum(first + np.arange(COLUMNS) * 15, len(clip) - 1)
+            root.append(clip.root_position[frames])
+            wxyz.append(clip.wxyz[frames])
+            labels += [f"{clip.name} {f / clip.fps:.2f}" for f in frames]
+        path = FOLDER / f"performer-{style}.png"
+        contact_sheet(
+            path,
+            performer.skeleton(),
+            np.concatenate(root)[:, None],
+            np.concatenate(wxyz)[:, None],
+            list(range(len(labels))),
+            columns=COLUMNS,
+            size=(110, 140),
+            labels=labels,
+        )
+        print(f"wrote {path}")
+
+
+if __name__ == "__main__":
+    main()
