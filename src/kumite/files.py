@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 import os
 import tempfile
@@ -86,3 +87,17 @@ def load(path: Path | str, kind: str, version: int) -> tuple[dict[str, Any], dic
         return header, load_tensors(blob)
     except (SafetensorError, ValueError, KeyError) as error:
         raise KumiteError(f"{path}: damaged {kind} ({error})") from None
+
+
+def code_digest(*modules: str) -> str:
+    """16 hex digits of the sources of modules and packages of ours ("graph", "clip", …).
+
+    What is computed by them and kept is kept under it: changed code finds nothing of the old.
+    """
+    h = hashlib.sha256()
+    root = Path(__file__).parent
+    for name in sorted(modules):
+        for path in [root / f"{name}.py", *sorted((root / name).glob("*.py"))]:
+            if path.exists():
+                h.update(path.read_bytes())
+    return h.hexdigest()[:16]

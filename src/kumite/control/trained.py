@@ -41,7 +41,8 @@ def trained(
     A folder of None, or one that cannot be written, only means that it is solved again next time.
     """
     settings = {"library": library.digest, "residual": residual, **asdict(behaviour)}
-    key = hashlib.sha256(f"{VERSION}{json.dumps(settings, sort_keys=True)}".encode()).hexdigest()
+    settings["code"] = files.code_digest("control", "kernels")
+    key = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
     path = None if folder is None else Path(folder) / f"{behaviour.name}-{key[:16]}.policy"
     if path is not None and path.exists():
         try:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 from collections.abc import Callable
 from pathlib import Path
 
 from kumite import performer
 from kumite.clip import Clip, concatenate
 from kumite.errors import KumiteError
-from kumite.graph.library import VERSION, Library, build_library, load_library, save_library
+from kumite.files import code_digest
+from kumite.graph.library import Library, build_library, load_library, save_library
 
 FPS = 60.0
 
@@ -18,18 +18,14 @@ FPS = 60.0
 def builtin_library(
     cache: Path | None, progress: Callable[[str], None] = lambda stage: None
 ) -> Library:
-    """The built-in performer's motion graph, kept in ``cache`` under the content of its clips."""
+    """The built-in performer's motion graph, kept in ``cache`` under the code that makes it."""
+    key = code_digest("performer", "annotate", "graph", "clip", "rotation", "kernels")
+    path = None if cache is None else cache / f"performer-{key}.kumite"
+    if path is not None and path.exists():
+        with contextlib.suppress(KumiteError):  # damaged or of another version: made anew
+            return load_library(path)
     progress("performing")
     clips = concatenate(_voluntary(performer.perform()), FPS)
-    h = hashlib.sha256(f"{VERSION}".encode())
-    h.update(clips.root_position.tobytes())
-    h.update(clips.wxyz.tobytes())
-    path = None if cache is None else cache / f"performer-{h.hexdigest()[:16]}.kumite"
-    if path is not None and path.exists():
-        try:
-            return load_library(path)
-        except KumiteError:
-            pass  # damaged or of another version: made anew
     library = build_library(clips, progress=progress)
     if path is not None:
         with contextlib.suppress(KumiteError):  # a cache that cannot be written only costs time

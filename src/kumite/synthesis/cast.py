@@ -185,8 +185,11 @@ def _blow_windows(library: Library) -> np.ndarray:
     out = np.full((len(clips), 4), NO_BLOW, dtype=np.int32)
     before, after = round(BLOW_BEFORE * clips.fps), round(BLOW_AFTER * clips.fps)
     for x in range(len(strikes)):
-        c = clips.clip_of_frame[strikes.frame[x]]
+        c, limb = clips.clip_of_frame[strikes.frame[x]], strikes.limb[x]
         low = max(int(strikes.start[x]) - before, int(clips.clip_start[c]))
         high = min(int(strikes.stop[x]) + after, int(clips.clip_start[c + 1]))
-        out[low:high, strikes.limb[x]] = x
+        around = out[low:high, limb]
+        around[around == NO_BLOW] = x
+    for x in range(len(strikes)):  # a drive is its own blow's, whatever comes close before or after
+        out[strikes.start[x] : strikes.stop[x], strikes.limb[x]] = x
     return out
