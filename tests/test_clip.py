@@ -72,6 +72,14 @@ def test_facing_survives_a_body_that_lies_on_its_side():
     assert np.allclose(facing[:, 2], 0.5)
 
 
+def test_facing_does_not_leak_from_one_clip_into_the_next():
+    a, b = toys.still(2, name="a", yaw=0.5), toys.still(2, name="b", yaw=-1.0)
+    wxyz = b.wxyz.copy()
+    wxyz[0, 0] = rotation.multiply(wxyz[0, 0], rotation.from_axis_angle([0, 0, 1], np.pi / 2))
+    rolled = clips.Clip("b", b.skeleton, b.fps, b.root_position, wxyz)
+    assert np.allclose(clips.concatenate([a, rolled]).facing[:, 2], [0.5, 0.5, -1.0, -1.0])
+
+
 def test_tips_are_end_sites_else_the_farthest_joint_else_half_the_bone():
     s = toys.skeleton()
     joint, offset = s.tip("left_hand")

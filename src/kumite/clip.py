@@ -286,7 +286,9 @@ class ClipSet:
     @cached_property
     def facing(self) -> np.ndarray:
         """The facing frame [F, 3] (x, z, yaw) of every frame."""
-        return facing_frame(self.skeleton, self.root_position, self.wxyz)
+        cuts = self.clip_start[1:-1]  # where hips lie, the last clear direction is the same clip's
+        parts = zip(np.split(self.root_position, cuts), np.split(self.wxyz, cuts))
+        return np.concatenate([facing_frame(self.skeleton, *part) for part in parts])
 
 
 def forward_kinematics(
