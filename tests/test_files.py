@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 
@@ -36,6 +38,33 @@ def test_other_kinds_versions_and_damage_are_told_apart(tmp_path):
         files.load(path, "thing", 3)
     with pytest.raises(KumiteError, match="cannot be read"):
         files.load(tmp_path / "none", "thing", 3)
+
+
+def test_one_changed_bit_is_damage(tmp_path):
+    path = tmp_path / "x"
+    files.save(path, "thing", 3, {"fps": 30.0}, {"a": np.arange(50), "none": np.zeros((0, 3))})
+    whole = path.read_bytes()
+    for place in (whole.index(b"30.0"), len(whole) - 1, len(whole) - 200):
+        changed = bytearray(whole)
+        changed[place] ^= 1
+        path.write_bytes(changed)
+        with pytest.raises(KumiteError, match="damaged thing"):
+            files.load(path, "thing", 3)
+
+
+def test_a_device_is_never_replaced_and_a_link_is_followed(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(KumiteError, match="expected a file"), files.writing(pipe):
+        pass
+    assert pipe.is_fifo()
+    with pytest.raises(KumiteError, match="Is a directory"), files.writing(tmp_path):
+        pass
+    link = tmp_path / "link"
+    link.symlink_to(tmp_path / "deep" / "real")
+    with files.writing(link) as temporary:
+        temporary.write_text("new")
+    assert link.is_symlink() and (tmp_path / "deep" / "real").read_text() == "new"
 
 
 def test_a_failed_write_leaves_the_old_file_and_no_other(tmp_path):
