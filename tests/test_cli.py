@@ -191,6 +191,14 @@ def test_two_skeletons_in_one_library(kumite, tmp_path):
         (["build", "still.bvh", "-o", "x.kumite"], "too few frames for a graph"),
         (["build", "still.bvh", "-o", "x.kumite", "--event", "hop"], "unknown event 'hop'"),
         (["build", "still.bvh", "-o", "x.kumite", "--per-second", "0"], "per_second"),
+        (["build", "still.bvh", "-o", "x.kumite", "--per-second", "inf"], "per_second inf"),
+        (["build", "still.bvh", "-o", "x.kumite", "--fps", "1e9"], "at most 1000000"),
+        (
+            ["run", "sparring", "-l", "BUILT", "--seconds", "1e9"],
+            "seconds: 1e+09, expected at most",
+        ),
+        (["run", "x" * 5000], "unknown scene"),
+        (["run", ""], "unknown scene"),
         (["build", "still.bvh", "-o", "x.kumite", "--role", "hand"], "ROLE=JOINT"),
         (["run", "spaning"], "did you mean sparring"),
         (["run", "sparring", "-l", "none.kumite"], "none.kumite: cannot be read"),
@@ -221,7 +229,7 @@ def test_a_damaged_or_other_version_of_a_library(kumite, built: Path, tmp_path: 
     status, _, err = kumite("run", "sparring", "-l", "cut.kumite")
     assert status == 2 and "cut.kumite: damaged" in err
     (tmp_path / "new.kumite").write_bytes(
-        whole.replace(b'\\"version\\": 1', b'\\"version\\": 9', 1)
+        whole.replace(b'\\"version\\": 2', b'\\"version\\": 9', 1)
     )
     status, _, err = kumite("run", "sparring", "-l", "new.kumite")
     assert status == 2 and "version 9" in err

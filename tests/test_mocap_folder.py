@@ -271,6 +271,10 @@ def test_given_beats_settings_beats_inference(tmp_path: Path) -> None:
             "[files.'a.bvh']\nfsp = 3",
             r"toml:2: unknown key .*fsp.; expected one of file_fps, .*, name, roles",
         ),
+        (
+            "fps = 5\n[files.'a.bvh'.roles]\nfist = 'Hips'",
+            r"toml:2: files\.'a\.bvh'\.roles: unknown",
+        ),
         ("[files.'c.bvh']", r"toml:1: files\.'c\.bvh': no such file"),
         ("up_axis =", "not TOML"),
         ("x = 1\ny = 2", "unknown key 'x'.*\n.*unknown key 'y'"),

@@ -119,9 +119,18 @@ def test_a_scene_file_is_read(tmp_path):
         (GOOD.replace('name = "b"', 'name = "a"'), "twice: a"),
         (GOOD + "approach = 0\nstrike = 0\n", "at least one weight above 0"),
         (GOOD + "strike = nan\n", "character.1.strike"),
-        (GOOD + "weight = 1\n", "character.1.weight: Extra"),
+        (
+            GOOD + "weight = 1\n",
+            r"mine.toml:12: unknown key 'character.1.weight'; expected one of aims_at, appr",
+        ),
+        (
+            GOOD.replace("[0, 1]", "[0, 1e6]"),
+            r"mine.toml:9: character.1.position.1: 1000000.0; exp",
+        ),
+        (GOOD.replace("[0, 1]", "[0, 0.1]"), "a and b start 0.10 m apart; expected at least"),
+        ("a = " + "[" * 100_000, "not TOML"),
         ("title = ", "not TOML"),
-        ('title = "x"', "character: Field required"),
+        ('title = "x"', "character: missing"),
     ],
 )
 def test_wrong_scene_files_name_the_key(tmp_path, text, message):

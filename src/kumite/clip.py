@@ -18,6 +18,7 @@ from kumite.errors import KumiteError
 from kumite.kernels import pose as pose_kernels
 
 NO_PARENT = -1  # parents[0] of every skeleton
+MOST_FRAMES = 1_000_000  # of one resampled clip: more than two hours at 120 frames a second
 
 SIDES = ("left", "right")
 ARM_ROLES = ("clavicle", "upper_arm", "forearm", "hand")
@@ -340,7 +341,13 @@ def resample(clip: Clip, fps: float) -> Clip:
         raise KumiteError(f"{clip.name}: cannot resample to {fps} frames a second")
     if fps == clip.fps:
         return clip
-    count = int(np.floor((len(clip) - 1) * fps / clip.fps + 1e-6)) + 1
+    frames = (len(clip) - 1) * fps / clip.fps
+    if frames > MOST_FRAMES:
+        raise KumiteError(
+            f"{clip.name}: {frames:.3g} frames at {fps:g} frames a second (it has {len(clip)} at "
+            f"{clip.fps:g}); expected at most {MOST_FRAMES}"
+        )
+    count = int(np.floor(frames + 1e-6)) + 1
     at = np.minimum(np.arange(count) * (clip.fps / fps), len(clip) - 1)
     i = (at + 1e-9).astype(np.int64)
     t = np.maximum(at - i, 0.0)

@@ -25,7 +25,7 @@ from kumite.graph.transitions import (
 )
 
 KIND = "library"
-VERSION = 1
+VERSION = 2
 
 
 @dataclass(frozen=True)

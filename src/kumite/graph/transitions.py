@@ -57,8 +57,8 @@ def find_transitions(
     """
     if event not in EVENTS:
         raise unknown("event", event, EVENTS)
-    if not per_second > 0:
-        raise KumiteError("per_second: expected more than 0 transitions a second")
+    if not 0 < per_second < np.inf:
+        raise KumiteError(f"per_second {per_second}; expected more than 0 transitions a second")
     features = features or pose_features(clips)
     frames, group = _candidate_frames(clips, contacts, event)
     if len(frames) < 2:
@@ -68,7 +68,7 @@ def find_transitions(
         )
     joined = np.zeros(len(frames), dtype=bool)
     joined[1:] = (np.diff(frames) == 1) & (np.diff(clips.clip_of_frame[frames]) == 0)
-    wanted = max(1, round(per_second * clips.seconds))
+    wanted = max(1, round(min(per_second * clips.seconds, float(len(clips)) ** 2)))
     a, b, d = _local_minima(features.take(frames), joined, group, wanted)
     candidates = len(d)
     if event != "none":

@@ -18,14 +18,13 @@ name = "walk"
 
 from __future__ import annotations
 
-import re
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from kumite import toml
 from kumite.clip import ROLES
 from kumite.errors import KumiteError, at
 
@@ -81,49 +80,15 @@ def read_settings(folder: Path) -> FolderSettings | None:
         return None
     except (OSError, UnicodeDecodeError) as error:
         raise KumiteError(f"{path}: cannot be read ({error})") from None
-    try:
-        data = tomllib.loads(source)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        line = re.search(r"at line (\d+)", str(error))
-        raise at(path, int(line[1]) if line else None, f"not TOML: {error}") from None
-    try:
-        settings = FolderSettings.model_validate(data)
-    except ValidationError as error:
-        raise KumiteError("\n".join(_problems(path, source, error))) from None
+    settings = toml.parse(source, path, FolderSettings)
     for name in settings.files:
         if not (folder / name).is_file():
             raise at(
                 path,
-                _line_of(source, name),
+                toml.line_of(source, "files", name),
                 f"files.{name!r}: no such file; expected a path below {folder}",
             )
     return settings
-
-
-def _problems(path: Path, source: str, error: ValidationError) -> list[str]:
-    out = []
-    for problem in error.errors():
-        where = [str(k) for k in problem["loc"]]
-        inside_file = where[0] == "files" and len(where) > 2
-        model = FileSettings if inside_file else FolderSettings
-        key = ".".join(repr(k) if "." in k else k for k in where)
-        if problem["type"] == "extra_forbidden":
-            valid = sorted(k for k in model.model_fields if inside_file or k != "name")
-            what = f"unknown key {key!r}; expected one of {', '.join(valid)}"
-        else:
-            message = problem["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
-            expected = message if "expected" in message else f"expected {message}"
-            what = f"{key}: {problem['input']!r}; {expected}"
-        out.append(f"{at(path, _line_of(source, where[-1]), what)}")
-    return out
-
-
-def _line_of(source: str, key: str) -> int | None:
-    """The line on which a key stands, as far as its text tells."""
-    for n, line in enumerate(source.split("\n"), 1):
-        if re.search(rf"(^|[\s.\[\"'{{,]){re.escape(key)}([\s\"'=\]]|$)", line.partition("#")[0]):
-            return n
-    return None
 
 
 class SettingsTree:

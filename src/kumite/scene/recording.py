@@ -17,7 +17,7 @@ from kumite.clip import Clip, Skeleton
 from kumite.errors import KumiteError, unknown
 
 KIND = "recording"
-VERSION = 1
+VERSION = 2
 NO_FRAME = -1  # library_frame of a pose that is no captured frame
 
 

@@ -11,6 +11,8 @@ from kumite.scene.live import LiveScene
 from kumite.scene.metrics import source_skate
 from kumite.scene.recording import Event, Recording
 
+MOST_BYTES = 16e9  # of one recording
+
 
 def record(
     scene: LiveScene, seconds: float, progress: Callable[[float], None] = lambda share: None
@@ -22,8 +24,13 @@ def record(
     """
     if not (np.isfinite(seconds) and seconds > 0):
         raise KumiteError(f"seconds: {seconds}, expected more than 0")
-    frames = max(1, round(seconds * scene.fps))
     count, joints = len(scene.names), len(scene.skeleton)
+    largest = MOST_BYTES / (16.0 * count * joints * scene.fps)  # of rotations, nearly all there is
+    if seconds > largest:
+        raise KumiteError(
+            f"seconds: {seconds:g}, expected at most {largest:.0f} (a recording is held in memory)"
+        )
+    frames = max(1, round(seconds * scene.fps))
     root = np.empty((frames, count, 3), np.float32)
     wxyz = np.empty((frames, count, joints, 4), np.float32)
     contacts = np.empty((frames, count, 2), bool)

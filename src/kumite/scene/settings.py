@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import difflib
-import tomllib
+import math
+import os
 from importlib import resources
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from kumite.errors import KumiteError, at
+from kumite import toml
+from kumite.errors import KumiteError
 
+CLOSEST_START = 0.4  # m between two characters: no body begins inside another
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+Metres = Annotated[float, Field(ge=-1000, le=1000)]  # recordings keep single precision
 Name = Annotated[str, Field(min_length=1, max_length=60)]
 
 
@@ -22,7 +26,7 @@ class _Settings(BaseModel):
 
 class CharacterSettings(_Settings):
     name: Name
-    position: tuple[Finite, Finite]  # m, x and z
+    position: tuple[Metres, Metres]  # m, x and z
     yaw_deg: Finite = 0.0  # 0 faces +Z
     aims_at: Name  # a character (its head) or an object
     approach: Annotated[Finite, Field(ge=0)] = 1.0  # weights of the behaviours
@@ -40,7 +44,7 @@ class CharacterSettings(_Settings):
 
 class ObjectSettings(_Settings):
     name: Name
-    position: tuple[Finite, Finite, Finite]  # m
+    position: tuple[Metres, Metres, Metres]  # m
     radius: Annotated[Finite, Field(gt=0, le=5)] = 0.1
     draggable: bool = True
 
@@ -63,6 +67,14 @@ class SceneSettings(_Settings):
                 raise ValueError(
                     f"{c.name} aims at {c.aims_at!r}; expected another name of the scene ({others})"
                 )
+        for i, a in enumerate(self.character):
+            for b in self.character[:i]:
+                gap = math.dist(a.position, b.position)
+                if gap < CLOSEST_START:
+                    raise ValueError(
+                        f"{b.name} and {a.name} start {gap:.2f} m apart; "
+                        f"expected at least {CLOSEST_START} m"
+                    )
         return self
 
 
@@ -70,7 +82,10 @@ def builtin_scenes() -> dict[str, SceneSettings]:
     """The scenes that come with Kumite, by name."""
     folder = resources.files("kumite.scene") / "builtin"
     files = sorted((f for f in folder.iterdir() if f.name.endswith(".toml")), key=lambda f: f.name)
-    return {f.name.removesuffix(".toml"): _parse(f.read_text("utf-8"), f.name) for f in files}
+    return {
+        f.name.removesuffix(".toml"): toml.parse(f.read_text("utf-8"), f.name, SceneSettings)
+        for f in files
+    }
 
 
 def load_scene(name: str) -> SceneSettings:
@@ -83,29 +98,17 @@ def load_scene(name: str) -> SceneSettings:
     if name in scenes:
         return scenes[name]
     path = Path(name)
-    if path.suffix == ".toml" or path.exists():
+    # Not Path.exists, which raises on a name that is too long for the system.
+    if path.suffix == ".toml" or os.path.exists(name):  # noqa: PTH110
         try:
-            return _parse(path.read_text("utf-8"), name)
-        except (OSError, UnicodeDecodeError) as error:
-            reason = getattr(error, "strerror", None) or "not UTF-8 text"
+            text = path.read_text("utf-8")
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or "not UTF-8 text; expected a TOML file"
             raise KumiteError(f"{name}: cannot be read ({reason})") from None
+        return toml.parse(text, name, SceneSettings)
     near = difflib.get_close_matches(name, scenes, n=2, cutoff=0.4)
     hint = f"did you mean {' or '.join(near)}? " if near else ""
     raise KumiteError(
         f"unknown scene {name!r}: {hint}expected one of {', '.join(sorted(scenes))}, "
         "or the path of a .toml scene file"
     )
-
-
-def _parse(text: str, where: str) -> SceneSettings:
-    try:
-        return SceneSettings.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise at(where, None, f"not TOML: {error}") from None
-    except ValidationError as error:
-        problems = []
-        for e in error.errors():
-            key = ".".join(str(part) for part in e["loc"]) or "scene"
-            given = f", not {e['input']!r}" if isinstance(e["input"], str | int | float) else ""
-            problems.append(f"{key}: {e['msg'].removeprefix('Value error, ')}{given}")
-        raise KumiteError(f"{where}: " + "; ".join(problems)) from None

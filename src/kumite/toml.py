@@ -1,0 +1,99 @@
+"""A user's TOML, checked by name: every problem at once, with its line and the valid choices."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any, TypeVar, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+
+from kumite.errors import KumiteError, at
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def parse(source: str, where: Path | str, model: type[Model]) -> Model:
+    """The settings that a text holds.
+
+    Errors: not TOML; unknown, missing and wrong keys.
+    """
+    try:
+        return model.model_validate(tomllib.loads(source))
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        line = re.search(r"at line (\d+)", str(error))
+        raise at(where, int(line[1]) if line else None, f"not TOML: {error}") from None
+    except ValidationError as error:
+        raise KumiteError("\n".join(_problems(where, source, model, error))) from None
+
+
+def _problems(
+    where: Path | str, source: str, model: type[BaseModel], error: ValidationError
+) -> list[str]:
+    out = []
+    for problem in error.errors():
+        place = problem["loc"]
+        key = ".".join(repr(k) if "." in str(k) else str(k) for k in place)
+        message = problem["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+        if problem["type"] == "extra_forbidden":
+            what = f"unknown key {key!r}; expected one of {', '.join(_keys(model, place[:-1]))}"
+        elif problem["type"] == "missing":
+            what = f"{key}: missing; expected a value"
+        elif problem["type"] == "value_error":  # raised by a model of ours: it says it all
+            what = f"{key}: {message}" if key else message
+        else:
+            given = repr(problem["input"])
+            given = given if len(given) < 80 else given[:77] + "…"
+            limits = problem.get("ctx", {})
+            if "too_short" in problem["type"]:
+                message = f"at least {limits['min_length']}"
+            elif "too_long" in problem["type"]:
+                message = f"at most {limits['max_length']}"
+            what = f"{key}: {given}; expected {message}"
+        out.append(f"{at(where, line_of(source, *place), what)}")
+    return out
+
+
+def _keys(model: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:
+    """The keys that the table at a place may hold."""
+    inside: Any = model
+    for part in place:
+        if isinstance(inside, type) and issubclass(inside, BaseModel):
+            inside = inside.model_fields[str(part)].annotation
+        else:  # an entry of a list or a table of tables
+            inside = next(a for a in reversed(get_args(inside)) if a is not Ellipsis)
+        if get_origin(inside) not in (dict, tuple, list):
+            models = [a for a in get_args(inside) if isinstance(a, type)]
+            inside = next((m for m in models if issubclass(m, BaseModel)), inside)
+    fields = inside.model_fields
+    return sorted(k for k, f in fields.items() if f.annotation is not type(None))
+
+
+def line_of(source: str, *place: int | str) -> int | None:
+    """The line on which a key stands, as far as its text tells; else its table's line.
+
+    A number counts the ``[[tables]]`` of the name before it.
+    """
+    lines = [line.partition("#")[0] for line in source.split("\n")]
+    found: int | None = None
+    begin, end = 0, len(lines)
+    for part, following in zip(place, [*place[1:], None]):
+        if isinstance(part, int):
+            continue
+        name = re.escape(part)
+        if isinstance(following, int):
+            header = re.compile(rf"\s*\[\[\s*[\"']?{name}[\"']?\s*\]\]")
+            tables = [n for n in range(begin, end) if header.match(lines[n])]
+            if following < len(tables):
+                found = begin = tables[following]
+                rest = range(begin + 1, end)
+                end = next((n for n in rest if lines[n].lstrip().startswith("[")), end)
+                continue
+        dot = "" if following is None else "."  # "a" is not the key "a.bvh", but leads to "a.b"
+        key = re.compile(rf"(^|[\s.\[\"'{{,]){name}([\s\"'=\]{dot}]|$)")
+        at_line = next((n for n in range(begin, end) if key.search(lines[n])), None)
+        if at_line is None:
+            break
+        found = begin = at_line
+    return None if found is None else found + 1
