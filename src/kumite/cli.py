@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,8 +24,10 @@ app = typer.Typer(
     help="Motion capture of one person at a time, turned into characters that spar.",
     epilog="Start with: kumite studio sparring (the built-in performer, no download).",
 )
-out = Console()
-err = Console(stderr=True)
+# Lines are never broken, so that what is piped on can be searched; nor are tables squeezed there.
+_WIDTH = None if sys.stdout.isatty() or "COLUMNS" in os.environ else 200
+out = Console(soft_wrap=True, width=_WIDTH)
+err = Console(stderr=True, soft_wrap=True)
 
 Source = Annotated[
     list[str], typer.Argument(help="Mocap: a folder, a glob, .bvh files, .amc files.")
@@ -66,21 +69,26 @@ def _root(
 
 def main() -> None:
     """Run the command line; bad input ends with one line on stderr and status 2."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):  # a terminal without "→" gets "?"
+            stream.reconfigure(errors="replace")
     try:
         app()
     except KumiteError as error:
-        err.print(f"error: {error}", markup=False, highlight=False, soft_wrap=True)
-        sys.exit(2)
-    except KeyboardInterrupt:
-        err.print("interrupted; nothing half-written was left behind")
-        sys.exit(130)
-    except BrokenPipeError:  # the reader of our output has gone (| head)
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        reason = str(error)
+    except MemoryError:
+        reason = "not enough memory; fewer files, a lower rate or a shorter time takes less"
+    except OSError as error:  # of files, all are KumiteErrors: this is our own output (disk full)
+        reason = f"cannot write to standard output ({error.strerror or error})"
+    else:
+        return
+    err.print(f"error: {reason}", markup=False, highlight=False)
+    sys.exit(2)
 
 
 @contextmanager
 def _progress() -> Iterator[Progress]:
-    """Bars on stderr, gone when done; nothing where nobody watches."""
+    """Bars on stderr, gone when done; a line a stage where stderr is no terminal."""
     columns = (
         SpinnerColumn(),
         TextColumn("{task.description}"),
@@ -88,8 +96,14 @@ def _progress() -> Iterator[Progress]:
         TextColumn("{task.fields[note]}"),
         TimeElapsedColumn(),
     )
-    with Progress(*columns, console=err, transient=True) as bars:
+    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as bars:
         yield bars
+
+
+def _log(line: str) -> None:
+    """A line instead of a bar, where stderr is a file."""
+    if not err.is_terminal:
+        err.print(line, markup=False, highlight=False)
 
 
 class _Stages:
@@ -101,6 +115,7 @@ class _Stages:
 
     def __call__(self, stage: str) -> None:
         self._bars.update(self._task, description=stage)
+        _log(stage)
 
 
 class _Training:
@@ -115,6 +130,7 @@ class _Training:
 
         if name not in self._tasks:
             self._tasks[name] = self._bars.add_task(f"training: {name}", total=4.0, note="")
+            _log(f"training: {name}")
         done = min(4.0, max(0.0, -log10(max(residual, 1e-4))))
         self._bars.update(
             self._tasks[name], completed=done, note=f"sweep {sweep}, residual {residual:.1e}"
@@ -216,7 +232,8 @@ def info(
         return
     table = Table(title=f"{len(loaded.clips)} clips, {sum(c.seconds for c in loaded.clips):.1f} s")
     for column in ("clip", "frames/s", "frames", "seconds", *(n.replace("_", " ") for n in LIMBS)):
-        table.add_column(column, justify="left" if column == "clip" else "right")
+        is_name = column == "clip"  # kept whole: cut short, two could look the same
+        table.add_column(column, justify="left" if is_name else "right", no_wrap=is_name)
     for clip in loaded.clips:
         row = (f"{clip.fps:g}", str(len(clip)), f"{clip.seconds:.2f}")
         table.add_row(clip.name, *row, *(str(hits[clip.name][limb] or "·") for limb in LIMBS))
@@ -248,8 +265,10 @@ def build(
     role: RoleOption = None,
 ) -> None:
     """Build a library: clips, contacts, effective hits and the motion graph, in one file."""
+    from kumite.files import refuse_unwritable
     from kumite.graph import build_library, save_library
 
+    refuse_unwritable(output)  # before the work, not after
     loaded = _load_clips(source, fps, file_fps, metres_per_unit, up_axis, ground, role)
     with _progress() as bars:
         library = build_library(
@@ -320,16 +339,15 @@ def run(
     as_json: JsonOption = False,
 ) -> None:
     """Run a scene without drawing, record it, and print how good it is."""
-    from kumite.scene import measure, record
+    from kumite.scene import load_scene, measure, record
 
-    for path in output or []:
-        _exporter(path)  # a wrong ending is said before the work, not after
+    _check_outputs(output or [], [c.name for c in load_scene(scene).character])
     live = _live_scene(scene, library, seed)
     with _progress() as bars:
         task = bars.add_task(f"running {scene}", total=1.0, note="")
         recording = record(live, seconds, lambda share: bars.update(task, completed=share))
     for path in output or []:
-        _export(recording, path, None)
+        _export(recording, path)
     _show_metrics(measure(recording), as_json)
     if not as_json:
         for path in output or []:
@@ -383,7 +401,20 @@ def _exporter(path: Path) -> str:
     return suffix
 
 
-def _export(recording: Any, path: Path, character: str | None) -> None:
+def _check_outputs(paths: list[Path], names: Sequence[str]) -> None:
+    """What cannot be written of these characters is said before the work, not after."""
+    from kumite.files import refuse_unwritable
+
+    for path in paths:
+        if _exporter(path) == ".bvh" and len(names) > 1:
+            raise KumiteError(
+                f"{path}: a BVH file holds one character; choose with "
+                f"'kumite export RECORDING -o {path} --character NAME' ({', '.join(names)})"
+            )
+        refuse_unwritable(path)
+
+
+def _export(recording: Any, path: Path) -> None:
     suffix = _exporter(path)
     if suffix == ".rec":
         from kumite.scene import save_recording
@@ -396,12 +427,7 @@ def _export(recording: Any, path: Path, character: str | None) -> None:
     elif suffix == ".bvh":
         from kumite.export.bvh import write_bvh
 
-        if character is None and len(recording.names) > 1:
-            raise KumiteError(
-                f"{path}: a BVH file holds one character; choose with --character "
-                f"({', '.join(recording.names)})"
-            )
-        write_bvh(path, recording.clip(character or recording.names[0]))
+        write_bvh(path, recording.clip(recording.names[0]))
     else:
         from kumite.export.sheet import recording_sheet
 
@@ -422,13 +448,12 @@ def export(
     """Write a recording as GLB (all characters), BVH (one of them) or a contact sheet."""
     from kumite.scene import load_recording
 
-    for path in output:
-        _exporter(path)
     loaded = load_recording(recording)
     if character is not None:
         loaded = loaded.only(character)
+    _check_outputs(output, loaded.names)
     for path in output:
-        _export(loaded, path, character)
+        _export(loaded, path)
         out.print(f"wrote {path}", markup=False, highlight=False)
 
 
@@ -470,7 +495,7 @@ def studio(
         strict_port=port is not None,
         open_browser=browser,
         seconds=seconds,
-        announce=lambda line: out.print(line, markup=False, highlight=False, soft_wrap=True),
+        announce=lambda line: out.print(line, markup=False, highlight=False),
     )
 
 
