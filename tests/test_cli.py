@@ -53,6 +53,8 @@ def test_from_mocap_files_to_a_fight(kumite, library: Library, tmp_path: Path):
     status, text, _ = kumite("info", "mocap", "--json", "--plot", "hits.png")
     assert status == 0 and (tmp_path / "hits.png").stat().st_size > 10_000
     info = json.loads(text)
+    status, table, _ = kumite("info", "mocap")
+    assert status == 0 and all(name in table for name in library.clips.names)  # none cut short
     assert {c["name"] for c in info["clips"]} == set(library.clips.names)
     assert info["metres_per_unit"] == 0.01 and info["roles"]["left_hand"]
     first = info["clips"][0]
@@ -126,6 +128,16 @@ def test_the_number_of_threads_does_not_change_the_bytes(built: Path, tmp_path: 
     assert written[0] == written[1]
 
 
+@pytest.mark.skipif(not Path("/dev/full").is_char_device(), reason="needs /dev/full")
+@pytest.mark.parametrize("args", [["scenes"], ["scenes", "--json"], ["--help"]])
+def test_output_to_a_full_disk_is_one_error(args):
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-m", "kumite", *args]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: cannot write to standard output (No space left")
+
+
 def test_scenes_are_listed(kumite):
     status, text, _ = kumite("scenes")
     assert status == 0 and "sparring" in text and "target" in text
@@ -188,6 +200,8 @@ def test_two_skeletons_in_one_library(kumite, tmp_path):
     ("args", "expected"),
     [
         (["info", "nowhere"], "nowhere"),
+        (["info", ""], "an empty name"),
+        (["info", "still.bvh", "--role", "fist=Hips"], "error: unknown role 'fist'"),
         (["build", "still.bvh", "-o", "x.kumite"], "too few frames for a graph"),
         (["build", "still.bvh", "-o", "x.kumite", "--event", "hop"], "unknown event 'hop'"),
         (["build", "still.bvh", "-o", "x.kumite", "--per-second", "0"], "per_second"),
@@ -205,7 +219,9 @@ def test_two_skeletons_in_one_library(kumite, tmp_path):
         (["run", "sparring", "-l", "still.bvh"], "not a file of Kumite's"),
         (["run", "sparring", "-l", "BUILT", "--seconds", "0"], "seconds"),
         (["run", "sparring", "-l", "BUILT", "-o", "x.mov"], "ending of x.mov"),
-        (["run", "sparring", "-l", "BUILT", "--seconds", "1", "-o", "x.bvh"], "--character"),
+        (["run", "sparring", "-l", "BUILT", "-o", "x.rec", "-o", "x.bvh"], "--character NAME"),
+        (["build", "still.bvh", "-o", "still.bvh/x.kumite"], "still.bvh is not a folder"),
+        (["build", "still.bvh", "-o", "/dev/null"], "/dev/null: cannot be written (a device"),
         (["run", "sparring", "-l", "BUILT", "--seconds", "1", "-o", "still.bvh/x.rec"], "written"),
         (["metrics", "none.rec"], "none.rec: cannot be read"),
         (["metrics", "BUILT"], "this is a library; expected a recording"),

@@ -147,10 +147,10 @@ def test_a_library_whose_numbers_point_nowhere_is_damaged(
 ):
     """Kernels follow them without looking: unchecked, they end the process."""
     save_library(tmp_path / "a.kumite", library)
-    header, arrays = files.load(tmp_path / "a.kumite", "library", 1)
+    header, arrays = files.load(tmp_path / "a.kumite", "library", 2)
     wrong = arrays[name].copy()
     wrong[len(wrong) // 2] = value
-    files.save(tmp_path / "b.kumite", "library", 1, header, {**arrays, name: wrong})
+    files.save(tmp_path / "b.kumite", "library", 2, header, {**arrays, name: wrong})
     with pytest.raises(KumiteError, match=f"b.kumite: damaged library .*{message}"):
         load_library(tmp_path / "b.kumite")
 

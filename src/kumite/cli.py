@@ -231,7 +231,7 @@ def info(
         )
         return
     table = Table(title=f"{len(loaded.clips)} clips, {sum(c.seconds for c in loaded.clips):.1f} s")
-    for column in ("clip", "frames/s", "frames", "seconds", *(n.replace("_", " ") for n in LIMBS)):
+    for column in ("clip", "fps", "frames", "seconds", *(n.replace("_", " ") for n in LIMBS)):
         is_name = column == "clip"  # kept whole: cut short, two could look the same
         table.add_column(column, justify="left" if is_name else "right", no_wrap=is_name)
     for clip in loaded.clips:
@@ -284,8 +284,8 @@ def build(
     lines = (
         f"{r['frames']} frames of {len(library.clips.names)} clips at {r['fps']:g} frames/s, "
         f"{r['hits']} blows",
-        f"{r['frames_kept']} frames connected: {r['states']} states, {r['actions']} actions of "
-        f"{r['mean_action_s']:.2f} s on average",
+        f"{r['frames_kept']} frames connected, {r['hits_kept']} blows in them: "
+        f"{r['states']} states, {r['actions']} actions of {r['mean_action_s']:.2f} s on average",
         f"{r['transitions']} transitions of {r['candidates']} candidates ({r['event']} lift-off), "
         f"mean join cost {r['mean_join_cost']:.2f}, accepted below {r['threshold']:.2f}",
         f"wrote {output} ({output.stat().st_size / 1e6:.1f} MB)",

@@ -105,6 +105,7 @@ def build_library(
         "mean_action_s": float(table.duration[table.stretch].mean() / clips.fps),
         "mean_join_cost": float(jumps.mean()) if len(jumps) else 0.0,
         "hits": len(strikes),
+        "hits_kept": int(kept[strikes.frame].sum()),
     }
     return Library(clips, contacts, strikes, table, report)
 

@@ -15,8 +15,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from kumite.clip import Clip, ClipSet, concatenate, resample
-from kumite.errors import KumiteError
+from kumite.clip import ROLES, Clip, ClipSet, concatenate, resample
+from kumite.errors import KumiteError, unknown
 from kumite.mocap import infer
 from kumite.mocap.asfamc import AsfSkeleton, read_amc, read_asf
 from kumite.mocap.bvh import read_bvh
@@ -151,6 +151,9 @@ def load(
             raise KumiteError(f"{what} {number}; expected a number more than 0")
     if ground is not None and not np.isfinite(ground):
         raise KumiteError(f"ground {ground}; expected a height in metres")
+    for role in roles or {}:
+        if role not in ROLES:
+            raise unknown("role", role, ROLES)
     given = {
         "fps": fps,
         "file_fps": file_fps,
@@ -228,6 +231,8 @@ def find_files(source: Source) -> list[tuple[Path, Path]]:
         if not found:
             raise KumiteError("an empty list of files; expected .bvh or .amc files")
         return list(found.items())
+    if not str(source):  # an unset variable of a shell; Path("") would be the current folder
+        raise KumiteError("an empty name; expected a folder, a glob or a file")
     path = Path(source)
     try:
         is_folder, exists = path.is_dir(), path.exists()

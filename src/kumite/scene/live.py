@@ -70,11 +70,17 @@ class LiveScene:
         self.names = tuple(c.name for c in settings.character)
         if len(library.strikes) == 0:
             raise KumiteError("the library holds no effective hits: nobody in it can strike")
+        tracks = stretch_tracks(library)
+        if len(tracks.tip) == 0:
+            raise KumiteError(
+                f"none of the library's {len(library.strikes)} blows is in the connected part of "
+                "its graph: nobody can strike; build it with more clips or more --per-second"
+            )
         self.skill = Skill(
             library,
             trained(library, approach(), cache, progress=progress),
             trained(library, strike(library), cache, progress=progress),
-            stretch_tracks(library),
+            tracks,
         )
         self.body = lay_body(self.skeleton)
         self._blows = self._lay_blows()

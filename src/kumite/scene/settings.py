@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import math
 import os
 from importlib import resources
 from pathlib import Path
@@ -14,7 +13,6 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from kumite import toml
 from kumite.errors import KumiteError
 
-CLOSEST_START = 0.4  # m between two characters: no body begins inside another
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Metres = Annotated[float, Field(ge=-1000, le=1000)]  # recordings keep single precision
 Name = Annotated[str, Field(min_length=1, max_length=60)]
@@ -67,14 +65,6 @@ class SceneSettings(_Settings):
                 raise ValueError(
                     f"{c.name} aims at {c.aims_at!r}; expected another name of the scene ({others})"
                 )
-        for i, a in enumerate(self.character):
-            for b in self.character[:i]:
-                gap = math.dist(a.position, b.position)
-                if gap < CLOSEST_START:
-                    raise ValueError(
-                        f"{b.name} and {a.name} start {gap:.2f} m apart; "
-                        f"expected at least {CLOSEST_START} m"
-                    )
         return self
 
 
