@@ -29,6 +29,8 @@ _WIDTH = None if sys.stdout.isatty() or "COLUMNS" in os.environ else 200
 out = Console(soft_wrap=True, width=_WIDTH)
 err = Console(stderr=True, soft_wrap=True)
 
+SHORTEST_ACTION = 0.25  # s; below it a graph is too fine to fight by
+
 Source = Annotated[
     list[str], typer.Argument(help="Mocap: a folder, a glob, .bvh files, .amc files.")
 ]
@@ -286,12 +288,20 @@ def build(
         f"{r['hits']} blows",
         f"{r['frames_kept']} frames connected, {r['hits_kept']} blows in them: "
         f"{r['states']} states, {r['actions']} actions of {r['mean_action_s']:.2f} s on average",
-        f"{r['transitions']} transitions of {r['candidates']} candidates ({r['event']} lift-off), "
+        f"{r['transitions']} transitions of {r['candidates']} candidates "
+        f"({'anywhere' if r['event'] == 'none' else r['event'] + ' lift-off'}), "
         f"mean join cost {r['mean_join_cost']:.2f}, accepted below {r['threshold']:.2f}",
         f"wrote {output} ({output.stat().st_size / 1e6:.1f} MB)",
     )
     for line in lines:
         out.print(line, markup=False, highlight=False)
+    if r["mean_action_s"] < SHORTEST_ACTION:
+        err.print(
+            f"warning: actions last {r['mean_action_s']:.2f} s on average; fighters look one "
+            "action ahead and will dither: join at a foot's lift-off (--event left, right or both)",
+            markup=False,
+            highlight=False,
+        )
 
 
 @app.command()
