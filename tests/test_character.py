@@ -111,10 +111,16 @@ def test_what_is_shown_goes_on_through_a_join(seed):
 
     before = shown(at)
     stood = rotation.planar_compose(anchor, facing[at])
+    state = (offset, spin, root_offset, root_velocity, foot_offset, foot_velocity, spin, spin)
+    ground = np.ones((6, 2), bool)
     kernels.join(
-        anchor, at, to, fps, root, wxyz, facing, ankle, clip,
-        offset, spin, root_offset, root_velocity, foot_offset, foot_velocity,
-    )  # fmt: skip
+        0,
+        at,
+        to,
+        anchor[None],
+        kernels.Capture(fps, root, wxyz, facing, ankle, ground, clip),
+        kernels.Offsets(*(x[None] for x in state)),
+    )
     for a, b in zip(before, shown(to)):
         assert np.allclose(a, b, atol=1e-9)
     stands = rotation.planar_compose(anchor, facing[to])

@@ -262,7 +262,7 @@ def test_a_struck_body_shows_it(library: Library):
         for e in scene.events[seen:]:
             if e.kind == "hit" and e.data["part"] == "head":
                 k = scene.names.index(e.data["victim"])
-                moved.append(float(np.abs(scene.cast._reaction_velocity[k]).max()))
+                moved.append(float(np.abs(scene.cast._offsets.reaction_velocity[k]).max()))
     assert moved and min(moved) > 0.1
 
 

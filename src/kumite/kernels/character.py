@@ -11,6 +11,8 @@ Shapes: K characters, J joints, F frames. Rotation offsets are rotation vectors 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import prange
 
@@ -19,6 +21,57 @@ from kumite.kernels.pose import add_rotated, forward_kinematics_frame, quaternio
 
 TINY = 1e-12
 MANY = 256  # characters (2 ms of work) from which threads pay, on cores that others use too
+
+
+class Capture(NamedTuple):
+    """The library's arrays that are played."""
+
+    fps: float
+    root: np.ndarray  # [F, 3]
+    wxyz: np.ndarray  # [F, J, 4]
+    facing: np.ndarray  # [F, 3]
+    ankle: np.ndarray  # [F, 2, 3]
+    on_ground: np.ndarray  # [F, 2] bool
+    clip_of_frame: np.ndarray  # [F]
+
+
+class Build(NamedTuple):
+    """The skeleton's arrays."""
+
+    parents: np.ndarray  # [J]
+    offsets: np.ndarray  # [J, 3]
+    legs: np.ndarray  # [2, 3] thigh, shin and foot joints
+
+
+class Springs(NamedTuple):
+    """Half-lives [s] of offsets, and how far [m] a planted foot may be held from the capture's."""
+
+    joint: float
+    root: float
+    reaction: float
+    longest_foot_offset: float
+
+
+class Offsets(NamedTuple):
+    """What is shown besides the capture, and how it moves."""
+
+    joint: np.ndarray  # [K, J, 3] rotation vectors
+    joint_velocity: np.ndarray
+    root: np.ndarray  # [K, 3] m
+    root_velocity: np.ndarray
+    foot: np.ndarray  # [K, 2, 3] m
+    foot_velocity: np.ndarray
+    reaction: np.ndarray  # [K, J, 3] rotation vectors
+    reaction_velocity: np.ndarray
+
+
+class Poses(NamedTuple):
+    """What is shown."""
+
+    root_position: np.ndarray  # [K, 3]
+    wxyz: np.ndarray  # [K, J, 4]
+    position: np.ndarray  # [K, J, 3]
+    world_wxyz: np.ndarray  # [K, J, 4]
 
 
 @kernel
@@ -116,69 +169,54 @@ def anchored_root(anchor, root_position, root_wxyz, position, wxyz):
 
 
 @kernel
-def join(
-    anchor,
-    frame_from,
-    frame_to,
-    fps,
-    library_root,
-    library_wxyz,
-    library_facing,
-    library_ankle,
-    clip_of_frame,
-    offset,
-    offset_velocity,
-    root_offset,
-    root_offset_velocity,
-    foot_offset,
-    foot_velocity,
-):
-    """Move one character from frame_from to frame_to = j - 1, which it resembles, in place.
+def join(k, frame_from, frame_to, anchor, capture, offsets):
+    """Move character k from frame_from to frame_to = j - 1, which it resembles, in place.
 
     What was shown stays shown: the differences go into the offsets.
     """
-    before = anchor.copy()
-    align(before, library_facing[frame_from], library_facing[frame_to], anchor)
+    here = anchor[k]
+    before = here.copy()
+    align(before, capture.facing[frame_from], capture.facing[frame_to], here)
     held, shown, turn, base = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
     p_from, p_to = np.empty(3), np.empty(3)
     v, w = np.zeros(3), np.zeros(3)
     past_from = frame_from - 1
-    if past_from < 0 or clip_of_frame[past_from] != clip_of_frame[frame_from]:
+    if past_from < 0 or capture.clip_of_frame[past_from] != capture.clip_of_frame[frame_from]:
         past_from = frame_from
     past_to = frame_to - 1
-    if past_to < 0 or clip_of_frame[past_to] != clip_of_frame[frame_to]:
+    if past_to < 0 or capture.clip_of_frame[past_to] != capture.clip_of_frame[frame_to]:
         past_to = frame_to
-    for j in range(library_wxyz.shape[1]):
-        exponential(offset[j], held)
+    for j in range(capture.wxyz.shape[1]):
+        exponential(offsets.joint[k, j], held)
         if j == 0:
             anchored_root(
-                before, library_root[frame_from], library_wxyz[frame_from, 0], p_from, turn
+                before, capture.root[frame_from], capture.wxyz[frame_from, 0], p_from, turn
             )
-            anchored_root(anchor, library_root[frame_to], library_wxyz[frame_to, 0], p_to, base)
+            anchored_root(here, capture.root[frame_to], capture.wxyz[frame_to, 0], p_to, base)
         else:
-            turn[:] = library_wxyz[frame_from, j]
-            base[:] = library_wxyz[frame_to, j]
+            turn[:] = capture.wxyz[frame_from, j]
+            base[:] = capture.wxyz[frame_to, j]
         quaternion_product(turn, held, shown)
-        difference(base, shown, offset[j])
-        difference(library_wxyz[past_from, j], library_wxyz[frame_from, j], v)
-        difference(library_wxyz[past_to, j], library_wxyz[frame_to, j], w)
+        difference(base, shown, offsets.joint[k, j])
+        difference(capture.wxyz[past_from, j], capture.wxyz[frame_from, j], v)
+        difference(capture.wxyz[past_to, j], capture.wxyz[frame_to, j], w)
         for c in range(3):
-            offset_velocity[j, c] += (v[c] - w[c]) * fps
+            offsets.joint_velocity[k, j, c] += (v[c] - w[c]) * capture.fps
     for c in range(3):
-        root_offset[c] += p_from[c] - p_to[c]
-    add_movement(library_root, past_from, frame_from, before, fps, root_offset_velocity)
-    add_movement(library_root, past_to, frame_to, anchor, -fps, root_offset_velocity)
+        offsets.root[k, c] += p_from[c] - p_to[c]
+    add_movement(capture.root, past_from, frame_from, before, capture.fps, offsets.root_velocity[k])
+    add_movement(capture.root, past_to, frame_to, here, -capture.fps, offsets.root_velocity[k])
     for f in range(2):
-        ankle = library_ankle[:, f]
-        add_movement(ankle, past_from, frame_from, before, fps, foot_velocity[f])
-        add_movement(ankle, past_to, frame_to, anchor, -fps, foot_velocity[f])
+        ankle = capture.ankle[:, f]
+        add_movement(ankle, past_from, frame_from, before, capture.fps, offsets.foot_velocity[k, f])
+        add_movement(ankle, past_to, frame_to, here, -capture.fps, offsets.foot_velocity[k, f])
         x0, z0 = planar_point(
-            before, library_ankle[frame_from, f, 0], library_ankle[frame_from, f, 2]
+            before, capture.ankle[frame_from, f, 0], capture.ankle[frame_from, f, 2]
         )
-        x1, z1 = planar_point(anchor, library_ankle[frame_to, f, 0], library_ankle[frame_to, f, 2])
-        foot_offset[f, 0] += x0 - x1
-        foot_offset[f, 1] += library_ankle[frame_from, f, 1] - library_ankle[frame_to, f, 1]
-        foot_offset[f, 2] += z0 - z1
+        x1, z1 = planar_point(here, capture.ankle[frame_to, f, 0], capture.ankle[frame_to, f, 2])
+        offsets.foot[k, f, 0] += x0 - x1
+        offsets.foot[k, f, 1] += capture.ankle[frame_from, f, 1] - capture.ankle[frame_to, f, 1]
+        offsets.foot[k, f, 2] += z0 - z1
 
 
 @kernel
@@ -265,201 +303,55 @@ def move_feet(foot_offset, foot_velocity, planted, half_life, longest, dt):
 
 
 @kernel
-def show_one(
-    k,
-    frame,
-    anchor,
-    dt,
-    half_life,
-    root_half_life,
-    reaction_half_life,
-    longest_foot_offset,
-    library_root,
-    library_wxyz,
-    library_ankle,
-    library_contact,
-    parents,
-    offsets,
-    legs,
-    offset,
-    offset_velocity,
-    root_offset,
-    root_offset_velocity,
-    foot_offset,
-    foot_velocity,
-    reaction,
-    reaction_velocity,
-    root_position,
-    wxyz,
-    position,
-    world_wxyz,
-):
+def show_one(k, frame, anchor, dt, springs, capture, build, offsets, poses):
     """One frame of character k of :func:`show`."""
     f = frame[k]
-    spring(root_offset[k], root_offset_velocity[k], root_half_life, dt)
+    root_position, wxyz = poses.root_position[k], poses.wxyz[k]
+    position, world_wxyz = poses.position[k], poses.world_wxyz[k]
+    spring(offsets.root[k], offsets.root_velocity[k], springs.root, dt)
     move_feet(
-        foot_offset[k], foot_velocity[k], library_contact[f], half_life, longest_foot_offset, dt
+        offsets.foot[k],
+        offsets.foot_velocity[k],
+        capture.on_ground[f],
+        springs.joint,
+        springs.longest_foot_offset,
+        dt,
     )
     turn, held, pushed, base = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
-    for j in range(library_wxyz.shape[1]):
-        spring(offset[k, j], offset_velocity[k, j], half_life, dt)
-        spring(reaction[k, j], reaction_velocity[k, j], reaction_half_life, dt)
+    for j in range(wxyz.shape[0]):
+        spring(offsets.joint[k, j], offsets.joint_velocity[k, j], springs.joint, dt)
+        spring(offsets.reaction[k, j], offsets.reaction_velocity[k, j], springs.reaction, dt)
         if j == 0:
-            anchored_root(anchor[k], library_root[f], library_wxyz[f, 0], root_position[k], base)
+            anchored_root(anchor[k], capture.root[f], capture.wxyz[f, 0], root_position, base)
         else:
-            base[:] = library_wxyz[f, j]
-        exponential(offset[k, j], held)
-        exponential(reaction[k, j], pushed)
+            base[:] = capture.wxyz[f, j]
+        exponential(offsets.joint[k, j], held)
+        exponential(offsets.reaction[k, j], pushed)
         quaternion_product(held, pushed, turn)
-        quaternion_product(base, turn, wxyz[k, j])
+        quaternion_product(base, turn, wxyz[j])
     for c in range(3):
-        root_position[k, c] += root_offset[k, c]
-    forward_kinematics_frame(
-        parents, offsets, root_position[k], wxyz[k], position[k], world_wxyz[k]
-    )
+        root_position[c] += offsets.root[k, c]
+    parents, bones = build.parents, build.offsets
+    forward_kinematics_frame(parents, bones, root_position, wxyz, position, world_wxyz)
     goal = np.empty(3)
     for s in range(2):
-        x, z = planar_point(anchor[k], library_ankle[f, s, 0], library_ankle[f, s, 2])
-        goal[0] = x + foot_offset[k, s, 0]
-        goal[1] = library_ankle[f, s, 1] + foot_offset[k, s, 1]
-        goal[2] = z + foot_offset[k, s, 2]
-        reach(
-            legs[s, 0],
-            legs[s, 1],
-            legs[s, 2],
-            goal,
-            parents,
-            offsets,
-            root_position[k],
-            wxyz[k],
-            position[k],
-            world_wxyz[k],
-        )
+        x, z = planar_point(anchor[k], capture.ankle[f, s, 0], capture.ankle[f, s, 2])
+        goal[0] = x + offsets.foot[k, s, 0]
+        goal[1] = capture.ankle[f, s, 1] + offsets.foot[k, s, 1]
+        goal[2] = z + offsets.foot[k, s, 2]
+        thigh, shin, foot = build.legs[s, 0], build.legs[s, 1], build.legs[s, 2]
+        reach(thigh, shin, foot, goal, parents, bones, root_position, wxyz, position, world_wxyz)
 
 
 @kernel
-def show(
-    frame,
-    anchor,
-    dt,
-    half_life,
-    root_half_life,
-    reaction_half_life,
-    longest_foot_offset,
-    library_root,
-    library_wxyz,
-    library_ankle,
-    library_contact,
-    parents,
-    offsets,
-    legs,
-    offset,
-    offset_velocity,
-    root_offset,
-    root_offset_velocity,
-    foot_offset,
-    foot_velocity,
-    reaction,
-    reaction_velocity,
-    root_position,
-    wxyz,
-    position,
-    world_wxyz,
-):
-    """One frame of all K characters: offsets move on by dt, then poses are made and feet put down.
-
-    legs [2, 3]: thigh, shin and foot joints. Outputs root_position [K, 3], wxyz [K, J, 4],
-    position [K, J, 3], world_wxyz [K, J, 4].
-    """
+def show(frame, anchor, dt, springs, capture, build, offsets, poses):
+    """One frame of all K characters: offsets move on by dt, poses are made, feet put down."""
     for k in range(frame.shape[0]):
-        show_one(
-            k,
-            frame,
-            anchor,
-            dt,
-            half_life,
-            root_half_life,
-            reaction_half_life,
-            longest_foot_offset,
-            library_root,
-            library_wxyz,
-            library_ankle,
-            library_contact,
-            parents,
-            offsets,
-            legs,
-            offset,
-            offset_velocity,
-            root_offset,
-            root_offset_velocity,
-            foot_offset,
-            foot_velocity,
-            reaction,
-            reaction_velocity,
-            root_position,
-            wxyz,
-            position,
-            world_wxyz,
-        )
+        show_one(k, frame, anchor, dt, springs, capture, build, offsets, poses)
 
 
 @parallel_kernel
-def show_many(
-    frame,
-    anchor,
-    dt,
-    half_life,
-    root_half_life,
-    reaction_half_life,
-    longest_foot_offset,
-    library_root,
-    library_wxyz,
-    library_ankle,
-    library_contact,
-    parents,
-    offsets,
-    legs,
-    offset,
-    offset_velocity,
-    root_offset,
-    root_offset_velocity,
-    foot_offset,
-    foot_velocity,
-    reaction,
-    reaction_velocity,
-    root_position,
-    wxyz,
-    position,
-    world_wxyz,
-):
+def show_many(frame, anchor, dt, springs, capture, build, offsets, poses):
     """:func:`show` on all cores: worth its start-up from ``MANY`` characters on."""
     for k in prange(frame.shape[0]):
-        show_one(
-            k,
-            frame,
-            anchor,
-            dt,
-            half_life,
-            root_half_life,
-            reaction_half_life,
-            longest_foot_offset,
-            library_root,
-            library_wxyz,
-            library_ankle,
-            library_contact,
-            parents,
-            offsets,
-            legs,
-            offset,
-            offset_velocity,
-            root_offset,
-            root_offset_velocity,
-            foot_offset,
-            foot_velocity,
-            reaction,
-            reaction_velocity,
-            root_position,
-            wxyz,
-            position,
-            world_wxyz,
-        )
+        show_one(k, frame, anchor, dt, springs, capture, build, offsets, poses)

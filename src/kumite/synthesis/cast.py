@@ -20,6 +20,7 @@ JOIN_HALF_LIFE = 0.10  # s, for the difference of the joints at a join
 ROOT_HALF_LIFE = 0.20  # s, the same for the root: its speed must not be felt to jump
 REACTION_HALF_LIFE = 0.16  # s, in which a struck body recovers
 LONGEST_FOOT_OFFSET = 0.30  # m that a planted foot may stand away from where the capture has it
+SPRINGS = kernels.Springs(JOIN_HALF_LIFE, ROOT_HALF_LIFE, REACTION_HALF_LIFE, LONGEST_FOOT_OFFSET)
 BLOW_BEFORE, BLOW_AFTER = 0.07, 0.12  # s around the effective frames in which a blow may land
 SPINE_SHARES = 3.0  # how much more readily each joint up the spine gives way than the one below
 
@@ -34,10 +35,17 @@ class Cast:
         self.count = count
         position, _ = clips.world
         feet = [skeleton.joint(f"{side}_foot") for side in SIDES]
-        self._ankle = np.ascontiguousarray(position[:, feet])
-        self._legs = np.array(
-            [[skeleton.joint(f"{s}_{p}") for p in ("thigh", "shin", "foot")] for s in SIDES]
+        legs = [[skeleton.joint(f"{s}_{p}") for p in ("thigh", "shin", "foot")] for s in SIDES]
+        self._capture = kernels.Capture(
+            clips.fps,
+            clips.root_position,
+            clips.wxyz,
+            clips.facing,
+            np.ascontiguousarray(position[:, feet]),
+            library.contacts.on_ground,
+            clips.clip_of_frame,
         )
+        self._build = kernels.Build(skeleton.parents, skeleton.offsets, np.array(legs))
         self.frame = np.zeros(count, dtype=np.int64)  # library frame shown
         self.stop = np.zeros(count, dtype=np.int64)  # last frame of the action: choose again there
         self.anchor = np.zeros((count, 3))  # library world → scene
@@ -46,14 +54,11 @@ class Cast:
         self.wxyz[..., 0] = 1.0
         self.position = np.zeros((count, joints, 3))
         self.world_wxyz = self.wxyz.copy()
-        self._offset = np.zeros((count, joints, 3))
-        self._offset_velocity = np.zeros((count, joints, 3))
-        self._root_offset = np.zeros((count, 3))
-        self._root_offset_velocity = np.zeros((count, 3))
-        self._foot_offset = np.zeros((count, 2, 3))
-        self._foot_velocity = np.zeros((count, 2, 3))
-        self._reaction = np.zeros((count, joints, 3))
-        self._reaction_velocity = np.zeros((count, joints, 3))
+        self._poses = kernels.Poses(self.root_position, self.wxyz, self.position, self.world_wxyz)
+        shapes = [(joints, 3), (3,), (2, 3), (joints, 3)]  # joint, root, foot, reaction
+        self._offsets = kernels.Offsets(
+            *(np.zeros((count, *shape)) for shape in shapes for _ in ("offset", "velocity"))
+        )
         self.blow_of_frame = _blow_windows(library)
 
     @property
@@ -76,43 +81,18 @@ class Cast:
         f = int(self.library.table.state_frame[state])
         self.frame[k] = self.stop[k] = f
         self.anchor[k] = planar_compose(facing, planar_inverse(self.library.clips.facing[f]))
-        for array in (
-            self._offset,
-            self._offset_velocity,
-            self._root_offset,
-            self._root_offset_velocity,
-            self._foot_offset,
-            self._foot_velocity,
-            self._reaction,
-            self._reaction_velocity,
-        ):
+        for array in self._offsets:
             array[k] = 0.0
 
     def begin(self, k: int, stretch: int) -> bool:
         """Take an action from the state that the character is in; whether it is a jump."""
-        table, clips = self.library.table, self.library.clips
+        table = self.library.table
         source, target = int(self.frame[k]), int(table.first[stretch]) - 1
         self.stop[k] = table.last[stretch]
         self.frame[k] = target
         if target == source:
             return False
-        kernels.join(
-            self.anchor[k],
-            source,
-            target,
-            clips.fps,
-            clips.root_position,
-            clips.wxyz,
-            clips.facing,
-            self._ankle,
-            clips.clip_of_frame,
-            self._offset[k],
-            self._offset_velocity[k],
-            self._root_offset[k],
-            self._root_offset_velocity[k],
-            self._foot_offset[k],
-            self._foot_velocity[k],
-        )
+        kernels.join(k, source, target, self.anchor, self._capture, self._offsets)
         return True
 
     def advance(self) -> None:
@@ -122,43 +102,24 @@ class Cast:
 
     def show(self, dt: float) -> None:
         """Make the poses of the frames that the characters are at, offsets moved on by dt [s]."""
-        clips = self.library.clips
         show = kernels.show_many if self.count >= kernels.MANY else kernels.show
         show(
             self.frame,
             self.anchor,
-            dt,
-            JOIN_HALF_LIFE,
-            ROOT_HALF_LIFE,
-            REACTION_HALF_LIFE,
-            LONGEST_FOOT_OFFSET,
-            clips.root_position,
-            clips.wxyz,
-            self._ankle,
-            self.library.contacts.on_ground,
-            clips.skeleton.parents,
-            clips.skeleton.offsets,
-            self._legs,
-            self._offset,
-            self._offset_velocity,
-            self._root_offset,
-            self._root_offset_velocity,
-            self._foot_offset,
-            self._foot_velocity,
-            self._reaction,
-            self._reaction_velocity,
-            self.root_position,
-            self.wxyz,
-            self.position,
-            self.world_wxyz,
+            float(dt),
+            SPRINGS,
+            self._capture,
+            self._build,
+            self._offsets,
+            self._poses,
         )
 
     def shift(self, k: int, dx: float, dz: float) -> None:
         """Carry a character over the ground [m]; planted feet stay where they are."""
         self.anchor[k, 0] += dx
         self.anchor[k, 1] += dz
-        self._foot_offset[k, :, 0] -= dx
-        self._foot_offset[k, :, 2] -= dz
+        self._offsets.foot[k, :, 0] -= dx
+        self._offsets.foot[k, :, 2] -= dz
 
     def strike(self, k: int, joint: int, point: np.ndarray, displacement: np.ndarray) -> None:
         """Displace a struck segment: ``point`` moves by about ``displacement`` [3] and recovers.
@@ -176,7 +137,7 @@ class Cast:
         turn = share[:, None] * np.cross(arms, displacement) / np.maximum(length2, 0.01)[:, None]
         local = rotate(conjugate(self.world_wxyz[k, chain]), turn)
         rate = 2.0 * np.log(2.0) / REACTION_HALF_LIFE
-        self._reaction_velocity[k, chain] += local * np.e * rate
+        self._offsets.reaction_velocity[k, chain] += local * np.e * rate
 
 
 def _blow_windows(library: Library) -> np.ndarray:
