@@ -18,7 +18,7 @@ FOLDER = Path(__file__).parents[1] / "docs"
 
 def main() -> None:
     for style in performer.STYLES:
-        performance = performer.perform(style)
+        performance = performer.perform(style, mirrored=False)
         root, wxyz, labels = [], [], []
         for clip, truth in zip(performance.clips, performance.truth):
             # From the moves themselves, evenly over the clip's beginning: a quarter second apart.
@@ -30,7 +30,7 @@ def main() -> None:
         path = FOLDER / f"performer-{style}.png"
         contact_sheet(
             path,
-            performer.skeleton(),
+            performance.clips[0].skeleton,
             np.concatenate(root)[:, None],
             np.concatenate(wxyz)[:, None],
             list(range(len(labels))),

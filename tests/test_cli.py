@@ -16,6 +16,7 @@ from kumite.clip import forward_kinematics
 from kumite.export.bvh import write_bvh
 from kumite.graph import Library, save_library
 from kumite.mocap import load
+from kumite.performer import STYLES, perform
 from tests import toys
 
 
@@ -138,6 +139,41 @@ def test_output_to_a_full_disk_is_one_error(args):
     assert done.stderr.startswith("error: cannot write to standard output (No space left")
 
 
+def test_the_performers_clips_leave_as_bvh_with_their_truth(kumite, tmp_path: Path):
+    status, text, _ = kumite("perform")
+    assert status == 0 and all(style in text for style in STYLES)
+    assert set(json.loads(kumite("perform", "--json")[1])) == set(STYLES)
+    status, text, _ = kumite("perform", "sword", "-o", "out", "--seed", "4", "--no-mirrored")
+    assert status == 0 and "wrote 9 clips to out" in text
+    made = perform("sword", 4, mirrored=False)
+    for clip, truth in zip(made.clips, made.truth):
+        (read,) = load(tmp_path / "out" / f"{clip.name}.bvh", metres_per_unit=0.01).clips
+        assert read.fps == pytest.approx(60)
+        ours, _ = forward_kinematics(clip.skeleton, clip.root_position, clip.wxyz)
+        theirs, _ = forward_kinematics(read.skeleton, read.root_position, read.wxyz)
+        # Written to the millionth of a centimetre; put on its ground again when read.
+        theirs = theirs[:, [read.skeleton.names.index(n) for n in clip.skeleton.names]]
+        drop = ours[0, 0, 1] - theirs[0, 0, 1]
+        assert abs(drop) < 0.05
+        assert np.abs(ours - theirs - [0, drop, 0]).max() < 1e-4
+        said = json.loads((tmp_path / "out" / f"{clip.name}.truth.json").read_text())
+        assert [s["frame"] for s in said["strikes"]] == [s.frame for s in truth.strikes]
+        planted = np.zeros((len(clip), 2), dtype=bool)
+        for k, side in enumerate(("left", "right")):
+            for start, stop in said["contacts"][side]:
+                planted[start:stop, k] = True
+        assert np.array_equal(planted, truth.on_ground)
+
+
+def test_likeness_is_shown_side_by_side(kumite, tmp_path: Path):
+    kumite("perform", "locomotion", "-o", "walks", "--no-mirrored")
+    status, text, _ = kumite("likeness", "walks/walk.bvh", "--style", "locomotion")
+    assert status == 0 and "step length (m)" in text and "locomotion" in text
+    both = json.loads(kumite("likeness", "walks/walk.bvh", "--style", "locomotion", "--json")[1])
+    assert set(both) == {"walks/walk.bvh", "locomotion"}
+    assert 0.8 < both["walks/walk.bvh"]["step_length"][1] < 1.4
+
+
 def test_scenes_are_listed(kumite):
     status, text, _ = kumite("scenes")
     assert status == 0 and "sparring" in text and "target" in text
@@ -229,6 +265,11 @@ def test_two_skeletons_in_one_library(kumite, tmp_path):
         (["studio", "none.rec"], "none.rec: cannot be read"),
         (["bench", "--only", "nothing like it"], "no figure"),
         (["info", "still.bvh", "--plot", "x.png"], "no effective hits"),
+        (["perform", "swrod"], "did you mean 'sword'"),
+        (["perform", "-o", "x"], "name a style to write"),
+        (["perform", "sword", "-o", "still.bvh/x"], "still.bvh/x: cannot be made"),
+        (["likeness"], "name motion capture files"),
+        (["likeness", "--style", "boxng"], "did you mean 'boxing'"),
     ],
 )
 def test_bad_input_ends_with_status_2_and_leaves_nothing(kumite, built, tmp_path, args, expected):

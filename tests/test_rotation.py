@@ -45,6 +45,20 @@ def test_products_and_rotation_agree_with_scipy(a, b, v):
     assert np.allclose(rotation.rotate(rotation.conjugate(p), rotation.rotate(p, v)), v, atol=1e-12)
 
 
+@given(rotvecs)
+def test_from_matrix_undoes_to_matrix(v):
+    q = rotation.exp(v)
+    back = rotation.from_matrix(scipy(q).as_matrix())
+    assert np.allclose(scipy(back).as_matrix(), scipy(q).as_matrix(), atol=1e-9)
+    many = rotation.from_matrix(np.stack([scipy(q).as_matrix(), np.eye(3)]))
+    assert many.shape == (2, 4) and np.allclose(np.abs(many[1]), [1, 0, 0, 0])
+
+
+@given(vectors, vectors)
+def test_cross_agrees_with_numpy(a, b):
+    assert np.allclose(rotation.cross(a, b), np.cross(a, b), atol=1e-12)
+
+
 @given(rotvecs, rotvecs, st.floats(0, 1))
 def test_slerp_moves_at_constant_speed_along_the_shortest_arc(a, b, t):
     p, q = rotation.exp(a), rotation.exp(b)

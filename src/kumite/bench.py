@@ -93,6 +93,13 @@ def _notes(folder: Path) -> float:
     return _best(work)
 
 
+@_figure("the performer's clips, all styles, from nothing", "s", 3.0)
+def _perform(folder: Path) -> float:
+    from kumite import performer
+
+    return _best(lambda: [performer.perform(style) for style in performer.STYLES])
+
+
 @_figure("distance stage", "frame pairs/s", 1.5e8)
 def _distance(folder: Path) -> float:
     from kumite.graph import pose_features
@@ -220,7 +227,7 @@ def default_folder(scratch: Path) -> Path:
     from kumite import performer
     from kumite.export.bvh import write_bvh
 
-    for clip in performer.perform().clips:
+    for clip in performer.perform(mirrored=False).clips:
         write_bvh(scratch / f"{clip.name}.bvh", clip)
     return scratch
 

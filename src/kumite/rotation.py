@@ -24,17 +24,15 @@ def normalize(wxyz: ArrayLike) -> np.ndarray:
 
 def multiply(a: ArrayLike, b: ArrayLike) -> np.ndarray:
     """Hamilton product [..., 4]: first b, then a."""
-    aw, ax, ay, az = np.moveaxis(np.asarray(a, dtype=np.float64), -1, 0)
-    bw, bx, by, bz = np.moveaxis(np.asarray(b, dtype=np.float64), -1, 0)
-    return np.stack(
-        [
-            aw * bw - ax * bx - ay * by - az * bz,
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-        ],
-        axis=-1,
-    )
+    a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
+    aw, ax, ay, az = (a[..., k] for k in range(4))
+    bw, bx, by, bz = (b[..., k] for k in range(4))
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    out[..., 0] = aw * bw - ax * bx - ay * by - az * bz
+    out[..., 1] = aw * bx + ax * bw + ay * bz - az * by
+    out[..., 2] = aw * by - ax * bz + ay * bw + az * bx
+    out[..., 3] = aw * bz + ax * by - ay * bx + az * bw
+    return out
 
 
 def conjugate(wxyz: ArrayLike) -> np.ndarray:
@@ -47,8 +45,19 @@ def rotate(wxyz: ArrayLike, vector: ArrayLike) -> np.ndarray:
     q = np.asarray(wxyz, dtype=np.float64)
     v = np.asarray(vector, dtype=np.float64)
     w, u = q[..., :1], q[..., 1:]
-    t = 2.0 * np.cross(u, v)
-    return v + w * t + np.cross(u, t)
+    t = 2.0 * cross(u, v)
+    return v + w * t + cross(u, t)
+
+
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Cross products [..., 3]: NumPy's, without its price for short arrays."""
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    out[..., 0] = ay * bz - az * by
+    out[..., 1] = az * bx - ax * bz
+    out[..., 2] = ax * by - ay * bx
+    return out
 
 
 def exp(rotation_vector: ArrayLike) -> np.ndarray:
@@ -139,6 +148,28 @@ def to_matrix(wxyz: ArrayLike) -> np.ndarray:
     q = np.asarray(wxyz, dtype=np.float64)
     flat = Rotation.from_quat(q.reshape(-1, 4), scalar_first=True)
     return flat.as_matrix().reshape(*q.shape[:-1], 3, 3)
+
+
+def from_matrix(matrix: np.ndarray) -> np.ndarray:
+    """Quaternions [..., 4] of rotation matrices [..., 3, 3], which are taken to be such.
+
+    Of the four ways to take the square root the one with the largest pivot (Shepperd 1978).
+    """
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = (
+        [matrix[..., r, c] for c in range(3)] for r in range(3)
+    )
+    rows = (
+        (1.0 + xx + yy + zz, zy - yz, xz - zx, yx - xy),
+        (zy - yz, 1.0 + xx - yy - zz, yx + xy, xz + zx),
+        (xz - zx, yx + xy, 1.0 - xx + yy - zz, zy + yz),
+        (yx - xy, xz + zx, zy + yz, 1.0 - xx - yy + zz),
+    )
+    pivot = np.argmax(np.stack([rows[k][k] for k in range(4)], axis=-1), axis=-1)[..., None]
+    q = np.stack(rows[0], axis=-1)
+    for k in range(1, 4):
+        if np.any(pivot == k):
+            q = np.where(pivot == k, np.stack(rows[k], axis=-1), q)
+    return normalize(q)
 
 
 def wrap_angle(angle: ArrayLike) -> np.ndarray:

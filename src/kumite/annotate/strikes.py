@@ -1,8 +1,10 @@
 """Effective hits of fists and feet (Lee & Lee 2004, section 6, data annotation).
 
-A blow delivers power where the tip's velocity, projected on the axis of the forearm (or the shin),
-is above a threshold and points along it. The paper marks frames; a *strike* is one run of such
-frames, told by its fastest frame, so that blows can be counted.
+A fist delivers power where its velocity, projected on the axis of the forearm, is above a threshold
+and points along it. The paper says no more; a foot kicks round its knee, so it counts where it is
+fast, seen from the hips, forward and ahead of them; and a sword, a joint of the role ``sword``,
+strikes with edge and point in front of the body. The paper marks frames; a *strike* is one run of
+such frames, told by its fastest frame, so that blows can be counted.
 """
 
 from __future__ import annotations
@@ -17,8 +19,12 @@ from kumite.errors import KumiteError
 from kumite.rotation import planar_apply, planar_inverse
 
 HAND_SPEED = 2.0  # m/s along the forearm
-FOOT_SPEED = 3.0  # m/s along the shin: walking swings a foot at 2 m/s without kicking
-_SEGMENT = {"hand": "forearm", "foot": "shin"}
+FOOT_SPEED = 6.0  # m/s from the hips: walking swings a foot at 3 m/s without kicking
+EDGE_SPEED = 12.0  # m/s of a weapon's tip, in a cut
+POINT_SPEED = 3.0  # m/s of a weapon's tip along the weapon, in a thrust
+AHEAD = 0.6  # m from the body in front, where a weapon strikes: before it is there it is swung back
+APART = 0.08  # s: no arm strikes twice within it
+FLOOR = 0.4  # m: a hand that goes lower reaches for the floor, it does not strike
 
 
 @dataclass(frozen=True)
@@ -27,7 +33,7 @@ class Strikes:
 
     effective: np.ndarray  # [F, 4] bool, in the order of clip.LIMBS
     tip: np.ndarray  # [F, 4, 3] m, the limbs' tips in the frame's facing frame
-    speed: np.ndarray  # [F, 4] m/s, tip velocity along the limb's axis
+    speed: np.ndarray  # [F, 4] m/s, what the threshold is for: see above
     frame: np.ndarray  # [X] int32, the fastest frame of each blow
     start: np.ndarray  # [X] int32, first frame above the threshold
     stop: np.ndarray  # [X] int32, one past the last
@@ -64,7 +70,7 @@ class Strikes:
 def find_strikes(
     clips: ClipSet, *, hand_speed: float = HAND_SPEED, foot_speed: float = FOOT_SPEED
 ) -> Strikes:
-    """Effective hits; thresholds are speeds along the limb's axis [m/s]."""
+    """Effective hits; hand_speed: of a fist along the forearm, foot_speed: from the hips [m/s]."""
     if hand_speed <= 0 or foot_speed <= 0:
         raise KumiteError("strikes: the speed thresholds must be above 0")
     position, world = clips.world
@@ -76,19 +82,28 @@ def find_strikes(
     tip = np.zeros((count, len(LIMBS), 3))
     speed = np.zeros((count, len(LIMBS)))
     rows = []
+    hips = velocity(position[:, skeleton.joint("pelvis")], clips)
     for k, limb in enumerate(LIMBS):
         side, part = limb.split("_")
         point = tip_positions(skeleton, limb, position, world)
         v = velocity(point, clips)
-        axis = (
-            position[:, skeleton.joint(limb)]
-            - position[:, skeleton.joint(f"{side}_{_SEGMENT[part]}")]
-        )
-        axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-9)
-        speed[:, k] = np.sum(v * axis, axis=1)
         tip[:, k] = planar_apply(to_facing, point)
-        effective[:, k] = speed[:, k] > (hand_speed if part == "hand" else foot_speed)
-        for a, b in _runs(effective[:, k], clips.clip_start):
+        weapon = skeleton.roles.get("sword")
+        if part == "foot":
+            swing = planar_apply(turn, v - hips)
+            speed[:, k] = np.linalg.norm(swing, axis=1)
+            effective[:, k] = (speed[:, k] > foot_speed) & (swing[:, 2] > 0) & (tip[:, k, 2] > 0)
+        elif weapon is not None and skeleton.tip(limb)[0] == weapon:
+            speed[:, k] = np.linalg.norm(v, axis=1)
+            deadly = (speed[:, k] > EDGE_SPEED) | (
+                _along(v, point, position[:, weapon]) > POINT_SPEED
+            )
+            effective[:, k] = deadly & (tip[:, k, 2] > AHEAD)
+        else:
+            elbow, wrist = (position[:, skeleton.joint(f"{side}_{r}")] for r in ("forearm", "hand"))
+            speed[:, k] = _along(v, wrist, elbow)
+            effective[:, k] = (speed[:, k] > hand_speed) & (point[:, 1] > FLOOR)
+        for a, b in _runs(effective[:, k], clips.clip_start, round(APART * clips.fps)):
             peak = a + int(np.argmax(speed[a:b, k]))
             rows.append((peak, a, b, k, planar_apply(turn[peak], v[peak])))
     rows.sort(key=lambda r: (r[0], r[3]))
@@ -102,11 +117,23 @@ def find_strikes(
     )
 
 
-def _runs(mask: np.ndarray, clip_start: np.ndarray) -> list[tuple[int, int]]:
-    """Half-open runs of True, cut at clip borders."""
+def _along(v: np.ndarray, end: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """The part [F] of velocities [F, 3] along the way from start to end [F, 3]."""
+    axis = end - start
+    return np.sum(v * axis, axis=1) / np.maximum(np.linalg.norm(axis, axis=1), 1e-9)
+
+
+def _runs(mask: np.ndarray, clip_start: np.ndarray, apart: int) -> list[tuple[int, int]]:
+    """Half-open runs of True, cut at clip borders; those less than ``apart`` frames apart join."""
     cut = np.zeros(len(mask) + 1, dtype=bool)
     cut[clip_start] = True
     padded = np.concatenate([[False], mask, [False]])
     start = np.flatnonzero(padded[1:-1] & (~padded[:-2] | cut[:-1]))
     stop = np.flatnonzero(padded[1:-1] & (~padded[2:] | cut[1:])) + 1
-    return list(zip(start.tolist(), stop.tolist()))
+    clip = np.searchsorted(clip_start, start, side="right")
+    new = (start[1:] - stop[:-1] >= apart) | (clip[1:] != clip[:-1])
+    ends = np.ones(
+        min(len(start), 1), dtype=bool
+    )  # the first run begins, the last one ends, if any
+    first, last = np.concatenate([ends, new]), np.concatenate([new, ends])
+    return list(zip(start[first].tolist(), stop[last].tolist()))

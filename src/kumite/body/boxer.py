@@ -192,6 +192,22 @@ HEAD = (
     (1.00, 0.004, 0.004, 0.006, -0.014),
 )
 HAIR_THICK = 0.008  # m
+# at is metres from the grip, in the fist, towards the point; front is the edge.
+HILT = (
+    (-0.100, 0.010, 0.010, 0.010),
+    (-0.095, 0.016, 0.016, 0.016),
+    (-0.080, 0.012, 0.012, 0.012),
+    (0.062, 0.012, 0.012, 0.012),
+    (0.064, 0.016, 0.085, 0.085),
+    (0.080, 0.016, 0.085, 0.085),
+    (0.082, 0.008, 0.010, 0.010),
+)
+BLADE = (  # but for the first row, at counts from the point
+    (0.080, 0.004, 0.017, 0.017),
+    (-0.100, 0.003, 0.014, 0.014),
+    (-0.006, 0.002, 0.005, 0.005),
+    (0.000, 0.001, 0.001, 0.001),
+)
 
 
 class Modeller:
@@ -252,7 +268,27 @@ def make_surfaces(skeleton: Skeleton, stance: Stance) -> list[Surface]:
         _arm(m, side, sign)
         _leg(m, side, sign)
         _foot(m, side)
+    if "sword" in skeleton.roles:
+        _sword(m)
     return m.surfaces
+
+
+def _sword(m: Modeller) -> None:
+    """A blade from the joint of the role ``sword`` to its tip, and a hilt."""
+    joint = m.skeleton.joint("sword")
+    tip_joint, offset = m.skeleton.tip("sword")
+    grip = m.stance.position[joint]
+    point = m.stance.position[tip_joint] + rotation.rotate(m.stance.wxyz[tip_joint], offset)
+    length = float(np.linalg.norm(point - grip))
+    axis = (point - grip) / length
+    flat = np.cross(axis, UP if abs(axis[1]) < 0.9 else FRONT)
+    flat = flat / np.linalg.norm(flat)
+    edge = np.cross(flat, axis)
+    blade = np.array([(*row, 0.0) for row in BLADE])
+    blade[1:, AT] += length
+    for role, rings in (("trim", blade), ("hair", np.array([(*row, 0.0) for row in HILT]))):
+        points = place(rings, ring_points(rings, 10), grip, axis, flat, edge)
+        m.add(role, points, m.only(joint, len(rings)))
 
 
 # Trunk and head ----------------------------------------------------------------------------------

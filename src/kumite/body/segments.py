@@ -165,7 +165,7 @@ def _ends(skeleton: Skeleton, stance: Stance) -> dict[str, tuple[int, np.ndarray
         out[f"{side}_hand"] = (
             joint(f"{side}_hand"),
             wrist + 0.2 * HAND_OF_STATURE * h * reach,
-            wrist + 0.65 * HAND_OF_STATURE * h * reach,
+            wrist + 0.42 * HAND_OF_STATURE * h * reach,
         )
         start, radius = RADIUS["foot"]
         heel, ball = foot_line(skeleton, stance, side)

@@ -19,13 +19,13 @@ def builtin_library(
     cache: Path | None, progress: Callable[[str], None] = lambda stage: None
 ) -> Library:
     """The built-in performer's motion graph, kept in ``cache`` under the code that makes it."""
-    key = code_digest("performer", "annotate", "graph", "clip", "rotation", "kernels")
+    key = code_digest("performer", "body", "annotate", "graph", "clip", "rotation", "kernels")
     path = None if cache is None else cache / f"performer-{key}.kumite"
     if path is not None and path.exists():
         with contextlib.suppress(KumiteError):  # damaged or of another version: made anew
             return load_library(path)
     progress("performing")
-    clips = concatenate(_voluntary(performer.perform()), FPS)
+    clips = concatenate(_voluntary(performer.performed(mirrored=False, cache=cache)), FPS)
     library = build_library(clips, progress=progress)
     if path is not None:
         with contextlib.suppress(KumiteError):  # a cache that cannot be written only costs time

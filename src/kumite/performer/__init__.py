@@ -1,77 +1,37 @@
 """The built-in performer: original clips authored in code, and their ground truth.
 
-Moves are tables (:mod:`kumite.performer.boxing`); a user's own :class:`Move` is performed alike:
+Moves are tables (:mod:`kumite.performer.punches` and others); a user's own :class:`Move` is
+performed alike:
 
     clip, truth = perform_take("mine", [as_written(move)], BOXING, rng=np.random.default_rng(0))
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass
-
-import numpy as np
-
-from kumite.clip import Clip
-from kumite.errors import unknown
+from kumite.performer.avoidance import AVOIDANCE
 from kumite.performer.boxing import BOXING
-from kumite.performer.figure import skeleton
+from kumite.performer.errands import ERRANDS
+from kumite.performer.kept import performed, truth_to_json
 from kumite.performer.locomotion import LOCOMOTION
-from kumite.performer.moves import Blow, Move, Step, Style, Take, aim
-from kumite.performer.take import (
-    Action,
-    Performed,
-    Strike,
-    Truth,
-    as_written,
-    perform_take,
-    vary,
-)
-
-STYLES = {style.name: style for style in (BOXING, LOCOMOTION)}
-
-
-@dataclass(frozen=True)
-class Performance:
-    """Clips at 60 Hz and, for each, what is true of it."""
-
-    clips: tuple[Clip, ...]
-    truth: tuple[Truth, ...]
-
-
-def perform(style: str = "boxing", seed: int = 0) -> Performance:
-    """All takes of a style of the repertoire. The same seed gives the same bytes.
-
-    Errors: an unknown style.
-    """
-    if style not in STYLES:
-        raise unknown("style", style, STYLES)
-    chosen = STYLES[style]
-    clips, truths = [], []
-    streams = np.random.SeedSequence(seed).spawn(len(chosen.takes))
-    for (name, take), stream in zip(chosen.takes.items(), streams):
-        rng = np.random.default_rng(stream)
-        order = list(take.moves)
-        if take.count is not None:
-            # Every move once before any comes again: a shuffled deck, not dice.
-            order = []
-            while len(order) < take.count:
-                order += [take.moves[k] for k in rng.permutation(len(take.moves))]
-        score = [vary(chosen.find(label), chosen, rng) for label in order[: take.count]]
-        clip, truth = perform_take(name, score, chosen, rng=rng)
-        clips.append(clip)
-        truths.append(truth)
-    return Performance(tuple(clips), tuple(truths))
-
+from kumite.performer.moves import Blow, Move, Plant, Step, Style, Take, aim, put
+from kumite.performer.perform import Performance, perform
+from kumite.performer.skeleton import skeleton
+from kumite.performer.styles import STYLES
+from kumite.performer.sword import SWORD
+from kumite.performer.take import Performed, as_written, perform_take, vary
+from kumite.performer.truth import Action, Strike, Truth
 
 __all__ = [
+    "AVOIDANCE",
     "BOXING",
+    "ERRANDS",
     "LOCOMOTION",
     "STYLES",
+    "SWORD",
     "Action",
     "Blow",
     "Move",
     "Performance",
     "Performed",
+    "Plant",
     "Step",
     "Strike",
     "Style",
@@ -81,6 +41,9 @@ __all__ = [
     "as_written",
     "perform",
     "perform_take",
+    "performed",
+    "put",
     "skeleton",
+    "truth_to_json",
     "vary",
 ]

@@ -6,65 +6,42 @@ such targets into joint rotations with analytic two-bone limbs, all frames at on
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kumite.clip import Skeleton
-from kumite.rotation import conjugate, from_axis_angle, multiply, rotate, slerp
-
-THIGH, SHIN = 0.435, 0.43  # m
-UPPER_ARM, FOREARM = 0.285, 0.255
-BALL = np.array([0.0, -0.062, 0.125])  # from the ankle to the ball of the foot, foot flat
-BALL_HEIGHT = 0.026  # of the ball's joint above the ground, foot flat
-STRAIGHTEST = 0.985  # of a leg's length: knees never lock
-ARM_STRAIGHTEST = 0.985
-CLOSEST_FIST = 0.15  # m from the shoulder: an elbow folds no further
-
-_BONES: tuple[tuple[str, str | None, tuple[float, float, float], str | None], ...] = (
-    ("Hips", None, (0.0, 0.0, 0.0), "pelvis"),
-    ("Spine", "Hips", (0.0, 0.10, -0.01), None),
-    ("Chest", "Spine", (0.0, 0.15, 0.0), "chest"),
-    ("Neck", "Chest", (0.0, 0.245, 0.01), "neck"),
-    ("Head", "Neck", (0.0, 0.095, 0.02), "head"),
-    ("LeftShoulder", "Chest", (0.03, 0.195, 0.0), "left_clavicle"),
-    ("LeftArm", "LeftShoulder", (0.15, 0.0, -0.01), "left_upper_arm"),
-    ("LeftForeArm", "LeftArm", (UPPER_ARM, 0.0, 0.0), "left_forearm"),
-    ("LeftHand", "LeftForeArm", (FOREARM, 0.0, 0.0), "left_hand"),
-    ("RightShoulder", "Chest", (-0.03, 0.195, 0.0), "right_clavicle"),
-    ("RightArm", "RightShoulder", (-0.15, 0.0, -0.01), "right_upper_arm"),
-    ("RightForeArm", "RightArm", (-UPPER_ARM, 0.0, 0.0), "right_forearm"),
-    ("RightHand", "RightForeArm", (-FOREARM, 0.0, 0.0), "right_hand"),
-    ("LeftUpLeg", "Hips", (0.09, -0.06, 0.0), "left_thigh"),
-    ("LeftLeg", "LeftUpLeg", (0.0, -THIGH, 0.0), "left_shin"),
-    ("LeftFoot", "LeftLeg", (0.0, -SHIN, 0.0), "left_foot"),
-    ("LeftToes", "LeftFoot", tuple(BALL.tolist()), "left_toe"),
-    ("RightUpLeg", "Hips", (-0.09, -0.06, 0.0), "right_thigh"),
-    ("RightLeg", "RightUpLeg", (0.0, -THIGH, 0.0), "right_shin"),
-    ("RightFoot", "RightLeg", (0.0, -SHIN, 0.0), "right_foot"),
-    ("RightToes", "RightFoot", tuple(BALL.tolist()), "right_toe"),
+from kumite.performer.clearance import clear_elbow, clear_hands
+from kumite.performer.limbs import held, middle, swivelled, two_bones
+from kumite.performer.skeleton import (
+    BALL,
+    BLADE,
+    BONES,
+    COLLARS,
+    FIST,
+    FOREARM,
+    HIPS,
+    SHIN,
+    THIGH,
+    UPPER_ARM,
+    Trunk,
+    trunk,
+    turn,
 )
-_TIPS = {
-    "Head": (0.0, 0.19, 0.015),
-    "LeftHand": (0.115, 0.0, 0.0),
-    "RightHand": (-0.115, 0.0, 0.0),
-    "LeftToes": (0.0, -0.012, 0.075),
-    "RightToes": (0.0, -0.012, 0.075),
-}
-FIST = 0.115  # m from the wrist to the front of the fist
+from kumite.rotation import conjugate, cross, from_axis_angle, multiply, rotate
 
-
-def skeleton() -> Skeleton:
-    """The performer's skeleton: 21 joints, 1.75 m tall, resting in a T facing +Z."""
-    names = [b[0] for b in _BONES]
-    return Skeleton(
-        tuple(names),
-        np.array([names.index(b[1]) if b[1] else -1 for b in _BONES]),
-        np.array([b[2] for b in _BONES]),
-        {b[3]: j for j, b in enumerate(_BONES) if b[3]},
-        np.array([names.index(n) for n in _TIPS]),
-        np.array(list(_TIPS.values())),
-    )
+STRAIGHTEST = 0.985  # of a leg's length: knees never lock
+ARM_STRAIGHTEST = 0.998
+CLOSEST_FIST = 0.215  # m from the shoulder: an elbow folds no further
+FADE = 0.08  # m over which what a leg does by itself sets in
+STRIDE = 0.23  # m of a foot from below its hip, as CROUCHED
+CROUCHED = 0.76  # m from hip to ankle, below which heels may have to rise
+CLOSEST_ANKLE = 0.22  # m from the hip
+STEEPEST_SHIN = 0.56  # rad that an ankle bends: a shin that leans further raises the heel
+KNEE_HEIGHT = 0.06  # m of the joint above the ground, kneeling
+GRIP = 3.0  # frames over which a hand rolls about its sword
+BRAKE = 0.02  # m over which an arm comes to its longest
+SWIVEL = 75.0  # deg by which an elbow that is "out" is raised from where it hangs
 
 
 @dataclass(frozen=True)
@@ -79,17 +56,10 @@ class Targets:
     chest_turn: np.ndarray  # [F, 3]
     head_turn: np.ndarray  # [F, 3]
     hand: np.ndarray  # [F, 2, 3] the front of the fist, left and right
-    elbow: np.ndarray  # [F, 2] 0: before the ribs, 1: out at shoulder height, -1: behind
+    elbow: np.ndarray  # [F, 2] 0: hanging, 1: out at shoulder height, below 0: tucked in
     ball: np.ndarray  # [F, 2, 3] the ball of the foot
     foot_turn: np.ndarray  # [F, 2, 2] yaw, and how far the heel is raised about the ball
-
-
-def turn(yaw_pitch_roll: np.ndarray) -> np.ndarray:
-    """Quaternions [..., 4] of (yaw, pitch, roll) [..., 3]."""
-    yaw = from_axis_angle(np.array([0.0, 1.0, 0.0]), yaw_pitch_roll[..., 0])
-    pitch = from_axis_angle(np.array([1.0, 0.0, 0.0]), yaw_pitch_roll[..., 1])
-    roll = from_axis_angle(np.array([0.0, 0.0, 1.0]), yaw_pitch_roll[..., 2])
-    return multiply(yaw, multiply(pitch, roll))
+    blade: np.ndarray | None = None  # [F, 3] the way a sword points
 
 
 def lowered(targets: Targets) -> np.ndarray:
@@ -97,8 +67,8 @@ def lowered(targets: Targets) -> np.ndarray:
     height = targets.pelvis[:, 1].copy()
     q = turn(targets.pelvis_turn)
     longest = STRAIGHTEST * (THIGH + SHIN)
-    for s, sign in enumerate((1.0, -1.0)):
-        hip = rotate(q, np.array([sign * 0.09, -0.06, 0.0]))
+    for s in range(2):
+        hip = rotate(q, HIPS[s])
         ankle = _ankle(targets, s)
         away = ankle[:, [0, 2]] - (targets.pelvis + hip)[:, [0, 2]]
         up = np.sqrt(np.maximum(longest**2 - np.sum(away**2, axis=1), 0.01))
@@ -106,145 +76,186 @@ def lowered(targets: Targets) -> np.ndarray:
     return height
 
 
-def pose(targets: Targets) -> tuple[np.ndarray, np.ndarray]:
-    """Root positions [F, 3] and joint rotations [F, J, 4] that meet the targets.
+def _frames(targets: Targets, some: np.ndarray) -> Targets:
+    """The targets of some frames."""
+    t = targets
+    pose = (
+        t.pelvis,
+        t.pelvis_turn,
+        t.chest_turn,
+        t.head_turn,
+        t.hand,
+        t.elbow,
+        t.ball,
+        t.foot_turn,
+    )
+    return Targets(*(array[some] for array in pose))
+
+
+def with_heels_raised(targets: Targets) -> Targets:
+    """The targets with heels raised where a knee is so far ahead that the ankle could not bend."""
+    foot_turn = targets.foot_turn.copy()
+    hips = turn(targets.pelvis_turn)
+    for s in range(2):
+        hip = targets.pelvis + rotate(hips, HIPS[s])
+        leg = hip - _ankle(targets, s)
+        # Cheap to tell where it may be so; the raise fades in with it, so that no heel jumps.
+        folded = (CROUCHED - np.linalg.norm(leg, axis=1)) / FADE
+        astride = (np.hypot(leg[:, 0], leg[:, 2]) - STRIDE) / FADE
+        share = np.clip(np.maximum(folded, astride), 0.0, 1.0)
+        some = np.flatnonzero(share)
+        if not len(some):
+            continue
+        part = _frames(targets, some)
+        for _ in range(4):
+            ankle = _ankle(part, s)
+            down = ankle - hip[some] - _knee(hips[some], hip[some], ankle, part, s)
+            down = down / np.linalg.norm(down, axis=1, keepdims=True)
+            toes = rotate(_foot(part, s), np.array([0.0, 0.0, 1.0]))
+            bend = -np.arcsin(np.clip(np.sum(down * toes, axis=1), -1.0, 1.0))
+            part.foot_turn[:, s, 1] += 0.8 * 0.05 * np.logaddexp(0.0, (bend - STEEPEST_SHIN) / 0.05)
+        raised = part.foot_turn[:, s, 1] - foot_turn[some, s, 1]
+        foot_turn[some, s, 1] += share[some] ** 2 * (3.0 - 2.0 * share[some]) * raised
+    return replace(targets, foot_turn=foot_turn)
+
+
+def pose(targets: Targets, body: Skeleton) -> np.ndarray:
+    """Joint rotations [F, J, 4] that meet the targets; the root is the pelvis.
 
     A hand that is out of reach is reached for as far as the arm goes.
     """
-    body = skeleton()
     frames = len(targets.pelvis)
     joint = {n: j for j, n in enumerate(body.names)}
     local = np.zeros((frames, len(body), 4))
     local[..., 0] = 1.0
-
-    hips, chest, head = (
-        turn(t) for t in (targets.pelvis_turn, targets.chest_turn, targets.head_turn)
-    )
-    half = np.full(frames, 0.5)
-    spine = slerp(hips, chest, half)
-    neck = slerp(chest, head, half)
-    local[:, joint["Hips"]] = hips
-    local[:, joint["Spine"]] = multiply(conjugate(hips), spine)
-    local[:, joint["Chest"]] = multiply(conjugate(spine), chest)
-    local[:, joint["Neck"]] = multiply(conjugate(chest), neck)
-    local[:, joint["Head"]] = multiply(conjugate(neck), head)
-
-    offset = body.offsets
-    at_spine = targets.pelvis + rotate(hips, offset[joint["Spine"]])
-    at_chest = at_spine + rotate(spine, offset[joint["Chest"]])
+    t = trunk(targets.pelvis, targets.pelvis_turn, targets.chest_turn, targets.head_turn)
+    for name, parent, _, _ in BONES[:5]:
+        turned = t.turned[name]
+        local[:, joint[name]] = turned if parent is None else _from(t.turned[parent], turned)
+    shoulders = np.stack([t.carried("Chest", p) for p in _SHOULDERS], axis=1)
+    hand = clear_hands(targets.hand, shoulders, t)
     for s, side in enumerate(("Left", "Right")):
-        sign = 1.0 - 2.0 * s
-        # The collarbone follows the fist a little: a reaching shoulder comes forward.
-        collar = at_chest + rotate(chest, offset[joint[f"{side}Shoulder"]])
-        reach = rotate(conjugate(chest), targets.hand[:, s] - collar)
-        ahead = np.clip(reach[:, 2] - 0.25, 0.0, 0.5)
-        rise = np.clip(reach[:, 1], -0.1, 0.3)
-        clavicle = multiply(
-            from_axis_angle(np.array([0.0, 1.0, 0.0]), -sign * 0.55 * ahead),
-            from_axis_angle(np.array([0.0, 0.0, 1.0]), sign * 0.35 * rise),
-        )
+        clavicle, upper, lower = _arm(t, hand[:, s], targets.elbow[:, s], s)
         local[:, joint[f"{side}Shoulder"]] = clavicle
-        clavicle = multiply(chest, clavicle)
-        shoulder = collar + rotate(clavicle, offset[joint[f"{side}Arm"]])
-        # Down, a little out, and ahead: a fist at the chin has its elbow before the ribs.
-        hang = np.array([0.3 * sign, -1.0, 0.5])
-        out = np.array([1.0 * sign, 0.05, -0.35])
-        behind = np.array([0.35 * sign, -0.2, -1.0])
-        e = targets.elbow[:, s : s + 1]
-        up, back = np.clip(e, 0.0, 1.0), np.clip(-e, 0.0, 1.0)
-        pole = rotate(chest, (1 - up - back) * hang + up * out + back * behind)
-        upper, lower = _two_bones(
-            shoulder,
-            targets.hand[:, s],
-            UPPER_ARM,
-            FOREARM + FIST,
-            pole,
-            np.array([sign, 0.0, 0.0]),
-            (CLOSEST_FIST, ARM_STRAIGHTEST * (UPPER_ARM + FOREARM + FIST)),
-        )
-        local[:, joint[f"{side}Arm"]] = multiply(conjugate(clavicle), upper)
-        local[:, joint[f"{side}ForeArm"]] = multiply(conjugate(upper), lower)
-
-        hip = targets.pelvis + rotate(hips, offset[joint[f"{side}UpLeg"]])
+        local[:, joint[f"{side}Arm"]] = _from(clavicle, upper)
+        local[:, joint[f"{side}ForeArm"]] = _from(upper, lower)
+        if s == 1 and targets.blade is not None:
+            blade = rotate(conjugate(t.turned["Chest"]), targets.blade)
+            held_so = held(lower, blade, np.array([-1.0, 0.0, 0.0]), BLADE, GRIP)
+            local[:, joint["RightHand"]] = _from(lower, held_so)
+        thigh, shin = _leg(t.turned["Hips"], targets, s)
         foot = _foot(targets, s)
-        knee = rotate(_yaw(targets.foot_turn[:, s, 0]), np.array([0.0, 0.0, 1.0]))
-        knee = knee + 0.5 * rotate(hips, np.array([0.25 * sign, 0.0, 1.0]))
-        thigh, shin = _two_bones(
-            hip,
-            _ankle(targets, s),
-            THIGH,
-            SHIN,
-            knee,
-            np.array([0.0, -1.0, 0.0]),
-            (0.1, 0.999 * (THIGH + SHIN)),
+        local[:, joint[f"{side}UpLeg"]] = _from(t.turned["Hips"], thigh)
+        local[:, joint[f"{side}Leg"]] = _from(thigh, shin)
+        local[:, joint[f"{side}Foot"]] = _from(shin, foot)
+        flat = from_axis_angle(
+            np.array([1.0, 0.0, 0.0]), -np.maximum(targets.foot_turn[:, s, 1], 0)
         )
-        local[:, joint[f"{side}UpLeg"]] = multiply(conjugate(hips), thigh)
-        local[:, joint[f"{side}Leg"]] = multiply(conjugate(thigh), shin)
-        local[:, joint[f"{side}Foot"]] = multiply(conjugate(shin), foot)
-        flat = from_axis_angle(np.array([1.0, 0.0, 0.0]), -targets.foot_turn[:, s, 1])
         local[:, joint[f"{side}Toes"]] = flat
-    return targets.pelvis, local
+    return local
 
 
-def _yaw(angle: np.ndarray) -> np.ndarray:
-    return from_axis_angle(np.array([0.0, 1.0, 0.0]), angle)
+_SHOULDERS = (np.array([0.18, 0.195, 0.0]), np.array([-0.18, 0.195, 0.0]))  # in the chest's axes
+
+
+def _from(parent: np.ndarray, child: np.ndarray) -> np.ndarray:
+    return multiply(conjugate(parent), child)
+
+
+def _arm(
+    t: Trunk, hand: np.ndarray, elbow: np.ndarray, s: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Collarbone, upper arm and forearm [F, 4], in the chest's axes, of an arm to a fist [F, 3]."""
+    sign = 1.0 - 2.0 * s
+    out = np.array([sign, 0.0, 0.0])
+    chest = t.turned["Chest"]
+    collar = np.array(COLLARS[s][0])
+    fist = rotate(conjugate(chest), hand - t.at["Chest"]) - collar
+    # The collarbone follows the fist a little: a reaching shoulder comes forward.
+    ahead = np.clip(fist[:, 2] - 0.25, 0.0, 0.5)
+    rise = np.clip(fist[:, 1], -0.1, 0.3)
+    clavicle = multiply(
+        from_axis_angle(np.array([0.0, 1.0, 0.0]), -sign * 0.55 * ahead),
+        from_axis_angle(np.array([0.0, 0.0, 1.0]), sign * 0.35 * rise),
+    )
+    shoulder = collar + rotate(clavicle, np.array(COLLARS[s][1]))
+    goal = fist + collar
+    pole = swivelled(
+        goal - shoulder,
+        np.array([-0.3 * sign, -0.2, 0.933]),
+        np.array([0.35 * sign, -0.9, -0.08]),
+        sign * np.radians(SWIVEL) * elbow,
+    )
+    lengths = (UPPER_ARM, FOREARM + FIST)
+    reach = (CLOSEST_FIST, ARM_STRAIGHTEST * (UPPER_ARM + FOREARM + FIST))
+    bent = middle(shoulder, goal, lengths, pole, reach, BRAKE)
+    room = clear_elbow(t.at["Chest"] + rotate(chest, shoulder + bent), t)
+    pole = rotate(conjugate(chest), room - t.at["Chest"]) - shoulder
+    upper, lower = two_bones(shoulder, goal, lengths, pole, out, reach, BRAKE)
+    return clavicle, upper, lower
+
+
+_LEG = (THIGH, SHIN)
+_LEG_REACH = (CLOSEST_ANKLE, 0.999 * (THIGH + SHIN))
+
+
+def _leg(hips: np.ndarray, targets: Targets, s: int) -> tuple[np.ndarray, np.ndarray]:
+    """Thigh and shin [F, 4], in the world, of a leg to its ankle."""
+    hip, ankle = targets.pelvis + rotate(hips, HIPS[s]), _ankle(targets, s)
+    bent = _knee(hips, hip, ankle, targets, s)
+    return two_bones(hip, ankle, _LEG, bent, np.array([0.0, -1.0, 0.0]), _LEG_REACH)
+
+
+def _knee(
+    hips: np.ndarray, hip: np.ndarray, ankle: np.ndarray, targets: Targets, s: int
+) -> np.ndarray:
+    """Where a knee is [F, 3], seen from its hip: the way the foot and the hips point."""
+    sign = 1.0 - 2.0 * s
+    yaw = targets.foot_turn[:, s, 0]
+    pole = np.stack([np.sin(yaw), np.zeros(len(yaw)), np.cos(yaw)], axis=1)
+    pole += 0.5 * rotate(hips, np.array([0.25 * sign, 0.0, 1.0]))
+    bent = middle(hip, ankle, _LEG, pole, _LEG_REACH)
+    share = np.clip((KNEE_HEIGHT + FADE - hip[:, 1] - bent[:, 1]) / FADE, 0.0, 1.0)[:, None]
+    low = np.flatnonzero(share)
+    if len(low):
+        out = sign * rotate(hips[low], np.array([1.0, 0.0, 0.0]))
+        bent[low] += share[low] * (_off_the_floor(hip[low], ankle[low], bent[low], out) - bent[low])
+    return bent
+
+
+def _off_the_floor(
+    hip: np.ndarray, ankle: np.ndarray, bent: np.ndarray, outward: np.ndarray
+) -> np.ndarray:
+    """Knees [F, 3], seen from the hips, turned about the leg's line until none is in the floor."""
+    way = ankle - hip
+    way = way / np.linalg.norm(way, axis=1, keepdims=True)
+    along = np.sum(bent * way, axis=1)
+    out = bent - along[:, None] * way
+    radius = np.maximum(np.linalg.norm(out, axis=1), 1e-6)
+    up = np.array([0.0, 1.0, 0.0]) - way[:, 1:2] * way
+    steep = np.maximum(np.linalg.norm(up, axis=1), 1e-3)
+    up = up / steep[:, None]
+    side = cross(way, up)
+    rise = np.sum(out * up, axis=1) / radius
+    least = (KNEE_HEIGHT - hip[:, 1] - along * way[:, 1]) / (radius * steep)
+    soft = 0.04
+    rise_to = np.minimum(least + soft * np.logaddexp(0.0, (rise - least) / soft), 0.98)
+    aside = np.sum(out * side, axis=1) / radius + 0.3 * np.sum(outward * side, axis=1)
+    aside = np.tanh(aside / 0.1) * np.sqrt(np.maximum(1.0 - rise_to**2, 0.0))
+    return along[:, None] * way + radius[:, None] * (rise_to[:, None] * up + aside[:, None] * side)
 
 
 def _foot(targets: Targets, s: int) -> np.ndarray:
-    heel = from_axis_angle(np.array([1.0, 0.0, 0.0]), targets.foot_turn[:, s, 1])
-    return multiply(_yaw(targets.foot_turn[:, s, 0]), heel)
+    """A foot's world rotation [F, 4]: its yaw, and then the heel about the ball."""
+    yaw, heel = 0.5 * targets.foot_turn[:, s, 0], 0.5 * targets.foot_turn[:, s, 1]
+    cy, sy, ch, sh = np.cos(yaw), np.sin(yaw), np.cos(heel), np.sin(heel)
+    return np.stack([cy * ch, cy * sh, sy * ch, -sy * sh], axis=1)
 
 
 def _ankle(targets: Targets, s: int) -> np.ndarray:
     """Ankles [F, 3]: the foot turns about its ball."""
-    return targets.ball[:, s] - rotate(_foot(targets, s), BALL)
-
-
-def _two_bones(
-    root: np.ndarray,
-    goal: np.ndarray,
-    first: float,
-    second: float,
-    pole: np.ndarray,
-    axis: np.ndarray,
-    reach: tuple[float, float],
-) -> tuple[np.ndarray, np.ndarray]:
-    """World rotations [F, 4] of two bones from root [F, 3] to goal [F, 3].
-
-    pole [F, 3]: the way the middle joint points; axis [3]: the bones' direction at rest; reach: the
-    shortest and the longest distance [m] between the ends that the bones may span. The bend's axis
-    is the cross product of pole and direction, so a hinge bends one way only.
-    """
-    to = goal - root
-    length = np.linalg.norm(to, axis=1, keepdims=True)
-    way = to / np.maximum(length, 1e-6)
-    d = np.clip(length[:, 0], *reach)
-    out = pole - np.sum(pole * way, axis=1, keepdims=True) * way
-    out = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-6)
-    along = (first**2 - second**2 + d**2) / (2 * d)
-    aside = np.sqrt(np.maximum(first**2 - along**2, 0.0))
-    upper = way * along[:, None] + out * aside[:, None]
-    lower = way * d[:, None] - upper
-    hinge = np.cross(out, way)
-    return _frame(upper, hinge, axis), _frame(lower, hinge, axis)
-
-
-def _frame(bone: np.ndarray, hinge: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    """Rotations [F, 4] that turn ``axis`` onto the bone, the joint's side axis on the hinge.
-
-    The side axis at rest is +X for a leg (knees bend about it) and ∓Y for an arm in a T.
-    """
-    bone = bone / np.linalg.norm(bone, axis=1, keepdims=True)
-    side = np.array([1.0, 0.0, 0.0]) if axis[1] else np.array([0.0, -axis[0], 0.0])
-    third = np.cross(axis, side)
-    hinge = hinge - np.sum(hinge * bone, axis=1, keepdims=True) * bone
-    hinge = hinge / np.maximum(np.linalg.norm(hinge, axis=1, keepdims=True), 1e-9)
-    rest = np.stack([axis, side, third], axis=1)  # columns
-    now = np.stack([bone, hinge, np.cross(bone, hinge)], axis=2)
-    return _from_matrix(now @ rest.T)
-
-
-def _from_matrix(m: np.ndarray) -> np.ndarray:
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_matrix(m).as_quat(scalar_first=True)
+    yaw, heel = targets.foot_turn[:, s, 0], targets.foot_turn[:, s, 1]
+    ahead = np.sin(heel) * BALL[1] + np.cos(heel) * BALL[2]
+    up = np.cos(heel) * BALL[1] - np.sin(heel) * BALL[2]
+    offset = np.stack([np.sin(yaw) * ahead, up, np.cos(yaw) * ahead], axis=1)
+    return targets.ball[:, s] - offset

@@ -9,19 +9,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from kumite.performer.moves import Move, Step, Style, Take, Vector
+from kumite.performer.moves import Foothold, Move, Step, Style, Take, Vector
 
 STAND: Mapping[str, Vector] = {
     "pelvis": (0.0, 0.988, 0.0),
     "pelvis_turn": (0.0, 2.0, 0.0),
     "chest_turn": (0.0, 3.0, 0.0),
     "head_turn": (0.0, 2.0, 0.0),
-    "left_hand": (0.255, 0.815, 0.07),
-    "right_hand": (-0.255, 0.815, 0.07),
-    "elbow": (-1.0, -1.0),
+    "left_hand": (0.27, 0.815, 0.07),
+    "right_hand": (-0.27, 0.815, 0.07),
+    "elbow": (0.15, 0.15),
     "heel": (0.0, 0.0),
 }
-FEET: Mapping[str, Vector] = {"left": (0.085, 0.125, 7.0), "right": (-0.085, 0.125, -7.0)}
+FEET: Mapping[str, Foothold] = {"left": (0.085, 0.125, 7.0), "right": (-0.085, 0.125, -7.0)}
+
+
+_SIGNS = {"left": 1.0, "right": -1.0}
 
 
 def _gait(
@@ -38,25 +41,30 @@ def _gait(
     lean: float = 0.0,
     twist: float = 7.0,
     sink: float = 0.0,
+    feet: float | None = None,
 ) -> Move:
     """One cycle of a gait.
 
     swing: share of the cycle that a foot is in the air; lift: how high [m]; rise: how much higher the
     pelvis is between steps than at them [m]; arms: how far hands swing to either side [m]; bend: how
     far elbows are bent, 0..1; toe_off: the heel before a foot is lifted [deg]; lean: of the trunk
-    [deg]; twist: of the hips [deg]; sink: how much lower the pelvis is than in the stand [m].
+    [deg]; twist: of the hips [deg]; sink: how much lower the pelvis is than in the stand [m];
+    feet: how far either foot is to the side [m], if not as in the stand.
     """
     t = seconds
     up, down = rise - sink, -rise - sink
     side = 0.022
-    ahead = 0.05 if lean > 4 else 0.0
 
     def hand(sign: float, at: float) -> tuple[float, float, float]:
         """A hand of the left (+1) or right side, ``at`` -1 behind to 1 ahead."""
-        x = 0.255 - 0.07 * bend
-        y = 0.785 + 0.30 * bend + 0.07 * bend * at + 0.025 * at**2
-        return (sign * x, y, 0.07 + 0.16 * bend + arms * at + ahead)
+        x = 0.27 - 0.02 * bend
+        y = 0.785 + 0.40 * bend + 0.07 * bend * at + 0.025 * at**2
+        return (sign * x, y, 0.07 + 0.16 * bend + arms * at)
 
+    apart = {
+        s: None if feet is None else (sign * feet, FEET[s][1], FEET[s][2])
+        for s, sign in _SIGNS.items()
+    }
     return Move(
         label,
         "transition",
@@ -105,12 +113,13 @@ def _gait(
             ),
         },
         (
-            Step("left", (0.5 - swing + 0.0) * t + 0.001, 0.5 * t, lift, True),
-            Step("right", (1.0 - swing) * t, t - 0.001, lift, True),
+            Step("left", (0.5 - swing) * t + 0.001, 0.5 * t, lift, True, apart["left"]),
+            Step("right", (1.0 - swing) * t, t - 0.001, lift, True, apart["right"]),
         ),
         travel,
         glide="steady",
-        holds=False,
+        from_guard=False,
+        to_guard=False,
     )
 
 
@@ -130,12 +139,13 @@ def _from_stand(cycle: Move, label: str) -> Move:
             **{c: ((0.7 * t, cycle.keys[c][1][1]),) for c in ("left_hand", "right_hand")},
         },
         (
-            Step("left", 0.16 * t, 0.50 * t, 0.7 * high, True),
-            Step("right", 0.58 * t, t - 0.001, 0.9 * high, True),
+            Step("left", 0.16 * t, 0.50 * t, 0.7 * high, True, cycle.steps[0].to),
+            Step("right", 0.58 * t, t - 0.001, 0.9 * high, True, cycle.steps[1].to),
         ),
         (x * share, z * share, yaw * share),
         glide="start",
-        holds=False,
+        from_guard=False,
+        to_guard=False,
     )
 
 
@@ -155,7 +165,8 @@ def _to_stand(cycle: Move, label: str) -> Move:
         ),
         (x * share, z * share, yaw * share),
         glide="stop",
-        holds=False,
+        from_guard=False,
+        to_guard=False,
     )
 
 
@@ -164,14 +175,14 @@ _RUN = {"swing": 0.64, "lift": 0.21, "rise": -0.03, "arms": 0.20, "bend": 1.0, "
 _GAITS = (
     _gait("walk", 1.08, (0, 1.22, 0), **_WALK),
     _gait("walk_slow", 1.24, (0, 0.95, 0), swing=0.38, lift=0.065, rise=0.009, arms=0.11, toe_off=22),
-    _gait("walk_turn_left", 1.10, (0, 1.10, 40), **_WALK),
-    _gait("walk_turn_right", 1.10, (0, 1.10, -40), **_WALK),
+    _gait("walk_turn_left", 1.10, (0, 1.10, 40), feet=0.11, **_WALK),
+    _gait("walk_turn_right", 1.10, (0, 1.10, -40), feet=0.11, **_WALK),
     _gait("walk_back", 1.14, (0, -0.85, 0), swing=0.38, lift=0.07, rise=0.008, arms=0.08, toe_off=16, twist=-4),
-    _gait("walk_left", 1.10, (0.62, 0, 0), swing=0.38, lift=0.07, rise=0.008, arms=0.03, toe_off=8, twist=0),
-    _gait("walk_right", 1.10, (-0.62, 0, 0), swing=0.38, lift=0.07, rise=0.008, arms=0.03, toe_off=8, twist=0),
-    _gait("run", 0.72, (0, 2.05, 0), twist=9.0, sink=0.085, **_RUN),
-    _gait("run_turn_left", 0.72, (0, 1.75, 55), twist=9.0, sink=0.105, **_RUN),
-    _gait("run_turn_right", 0.72, (0, 1.75, -55), twist=9.0, sink=0.105, **_RUN),
+    _gait("walk_left", 0.98, (0.36, 0, 0), swing=0.38, lift=0.07, rise=0.008, arms=0.03, toe_off=8, twist=0, feet=0.18),
+    _gait("walk_right", 0.98, (-0.36, 0, 0), swing=0.38, lift=0.07, rise=0.008, arms=0.03, toe_off=8, twist=0, feet=0.18),
+    _gait("run", 0.72, (0, 2.05, 0), twist=9.0, sink=0.07, **_RUN),
+    _gait("run_turn_left", 0.72, (0, 1.75, 38), twist=9.0, sink=0.09, feet=0.15, **_RUN),
+    _gait("run_turn_right", 0.72, (0, 1.75, -38), twist=9.0, sink=0.09, feet=0.15, **_RUN),
 )  # fmt: skip
 
 _LEAP = {
@@ -229,6 +240,5 @@ LOCOMOTION = Style(
         "leaps": Take(("stand", "leap_left", "leap_right", "leap_right", "leap_left"), 14),
     },
     vault=7,
-    hands_sink=1.0,
     sway=0.25,
 )  # fmt: skip

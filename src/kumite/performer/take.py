@@ -9,48 +9,26 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
-from kumite.clip import SIDES, Clip, forward_kinematics, tip_positions
+from kumite.clip import Clip
 from kumite.errors import KumiteError, unknown
-from kumite.performer.figure import BALL_HEIGHT, Targets, lowered, pose, skeleton
-from kumite.performer.moves import Aim, Move, Style
-from kumite.rotation import planar_apply
+from kumite.performer.figure import Targets, lowered, pose, with_heels_raised
+from kumite.performer.footwork import ease, walk
+from kumite.performer.moves import Aim, Move, Put, Style, Vector
+from kumite.performer.skeleton import skeleton, trunk
+from kumite.performer.truth import Truth, authored_actions, authored_strikes
+from kumite.rotation import planar_apply, planar_inverse
 
 FPS = 60.0
 SETTLE = 0.10  # s of guard between two moves
 LEAD_IN = 0.5  # s of guard before the first and after the last
-SMOOTHING = 0.022  # s, rounds off what keys leave of corners
+SMOOTHING = 0.03  # s, rounds off what keys leave of corners
+FIST_SMOOTHING = 0.012  # s, of hands: blows are quicker than trunks
 SWAY = 0.008  # m of bounce
-
-
-@dataclass(frozen=True)
-class Strike:
-    """A blow as it was authored."""
-
-    frame: int  # in which it lands
-    limb: str
-    tip: np.ndarray  # [3] m, world
-    velocity: np.ndarray  # [3] m/s of the tip, by central differences
-
-
-@dataclass(frozen=True)
-class Action:
-    """A move as it was performed: frames start..stop."""
-
-    start: int
-    stop: int
-    kind: str
-    label: str
-    avoid: tuple[int, int] | None = None  # frames in which the body is out of where it was
-    mark: int | None = None  # first frame of a target movement
-
-
-@dataclass(frozen=True)
-class Truth:
-    """What is true of a clip, because it was authored so."""
-
-    on_ground: np.ndarray  # [F, 2] bool, left and right foot planted
-    strikes: tuple[Strike, ...]
-    actions: tuple[Action, ...]
+HANDS = ("left_hand", "right_hand")
+FEET = ("left_foot", "right_foot")
+TURNS = ("pelvis_turn", "chest_turn", "head_turn")
+UNMOVED: dict[str, Vector] = {"left_foot": (0.0, 0.0, 0.0), "right_foot": (0.0, 0.0, 0.0)}
+"""Channels that a style's guard need not name."""
 
 
 @dataclass(frozen=True)
@@ -71,13 +49,18 @@ def vary(move: Move, style: Style, rng: np.random.Generator) -> Performed:
     """A move as a person does it the next time: other pace, other length, another target."""
     x, z, yaw = move.travel
     pace = float(rng.uniform(1 - style.tempo, 1 + style.tempo))
-    if not move.holds:
+    if not (move.from_guard or move.to_guard):
         return Performed(move, 1.0, move.travel)  # phases of a gait must fit each other
     scale = rng.uniform(1 - style.travel, 1 + style.travel)
-    drift = rng.normal(0, 0.02, 2) if move.steps else np.zeros(2)
+    # Feet never come down just where they were; at a target they do nearly.
+    stray = 0.01 if move.kind == "target" else 0.045
+    drift = rng.normal(0, stray, 2) if move.steps else np.zeros(2)
     swing = rng.normal(0, 4.0) if move.steps else 0.0
-    if move.kind == "attack":
-        z += rng.choice([0.0, 0.0, 0.10, 0.18])  # on the spot, or stepping in
+    if move.kind == "attack" and move.steps:
+        # On the spot half of the time, else with a step that turns to the target or closes in.
+        stepping = rng.random() < 0.6
+        z += stepping * rng.uniform(*style.blow_step)
+        swing += stepping * rng.uniform(-1, 1) * style.blow_turn
     shift = (
         rng.uniform(-1, 1) * style.blow_angle,
         rng.uniform(*style.blow_reach),
@@ -95,6 +78,7 @@ class _Track:
     """Keys of one channel over a whole take."""
 
     guard: np.ndarray
+    smoothing: float = SMOOTHING  # s
     times: list[float] = field(default_factory=list)
     values: list[np.ndarray] = field(default_factory=list)
 
@@ -105,11 +89,12 @@ class _Track:
         self.values.append(value)
 
     def sample(self, at: np.ndarray) -> np.ndarray:
-        if len(self.times) == 1:
-            return np.repeat(self.values[0][None], len(at), axis=0)
+        values = np.array(self.values)
+        if not np.any(values - values[0]):
+            return np.repeat(values[:1], len(at), axis=0)
         inside = np.clip(at, self.times[0], self.times[-1])
-        smooth = PchipInterpolator(self.times, np.array(self.values), axis=0)(inside)
-        return gaussian_filter1d(smooth, SMOOTHING * FPS, axis=0, mode="nearest")
+        smooth = PchipInterpolator(self.times, values, axis=0)(inside)
+        return gaussian_filter1d(smooth, self.smoothing * FPS, axis=0, mode="nearest")
 
 
 def perform_take(
@@ -124,83 +109,110 @@ def perform_take(
     starts, t = [], LEAD_IN
     for p in score:
         starts.append(t)
-        t += p.move.seconds * p.tempo + (SETTLE if p.move.holds else 0.0)
+        t += p.move.seconds * p.tempo + (SETTLE if p.move.to_guard else 0.0)
     total = t + LEAD_IN
     at = np.arange(round(total * FPS) + 1) / FPS
 
-    stance, feet, on_ground = _walk(score, starts, at, style)
     place = {c: v.sample(at) for c, v in _channels(score, starts, total, style).items()}
-    breath = _alive(at, style.sway, rng)
-    carried = {
-        c: planar_apply(stance, place[c] + breath.get(c, 0.0))
-        for c in ("pelvis", "left_hand", "right_hand")
-    }
-    turned = {c: np.radians(place[c]) for c in ("pelvis_turn", "chest_turn", "head_turn")}
-    for c in turned:
-        turned[c] = turned[c] + breath.get(c, 0.0)
+    stance, feet, aloft = walk(score, starts, at, FPS, style, place)
+    alive = _alive(at, style.sway, rng)
+    turned = {c: np.radians(place[c]) + alive.get(c, 0.0) for c in TURNS}
+    for c in TURNS:
         turned[c][:, 0] += stance[:, 2]
-    foot_turn = np.stack([feet[:, :, 3], np.radians(place["heel"])], axis=-1)
-    foot_turn[:, :, 1] = np.maximum(foot_turn[:, :, 1], 0.0)
+    # A planted foot raises its heel; only one in the air raises its toes.
+    heel = np.maximum(np.radians(place["heel"]), -0.5 * np.pi * aloft)
     targets = Targets(
-        carried["pelvis"],
+        planar_apply(stance, place["pelvis"] + alive["pelvis"])
+        + _weight(feet, aloft, style.weight),
         turned["pelvis_turn"],
         turned["chest_turn"],
         turned["head_turn"],
-        np.stack([carried["left_hand"], carried["right_hand"]], axis=1),
-        np.clip(place["elbow"], -1.0, 1.0),
+        np.zeros((len(at), 2, 3)),  # once the head is known
+        np.clip(place["elbow"], -1.0, 1.2),
         feet[:, :, :3],
-        foot_turn,
+        np.stack([feet[:, :, 3], heel], axis=-1),
+        _pointed(stance, place["blade"]) if style.armed else None,
     )
     pelvis = targets.pelvis.copy()
     # Lowest within the filter's width, then smoothed: smooth, and nowhere above what legs reach.
     low = minimum_filter1d(lowered(targets), 2 * style.vault + 1, mode="nearest")
     pelvis[:, 1] = gaussian_filter1d(low, style.vault / 3.0, mode="nearest", radius=style.vault)
-    hand = targets.hand.copy()
-    hand[:, :, 1] += style.hands_sink * (pelvis[:, 1] - targets.pelvis[:, 1])[:, None]
-    root, wxyz = pose(replace(targets, pelvis=pelvis, hand=hand))
-    clip = Clip(name, skeleton(), FPS, root, wxyz)
-    truth = Truth(on_ground, _strikes(clip, score, starts), _actions(score, starts))
-    return clip, truth
+    hand = _hands(score, starts, at, stance, place, alive, pelvis, turned, style)
+    targets = with_heels_raised(replace(targets, pelvis=pelvis, hand=hand))
+    wxyz = pose(targets, skeleton(armed="right" if style.armed else None))
+    clip = Clip(name, skeleton(armed="right" if style.armed else None), FPS, pelvis, wxyz)
+    strikes = authored_strikes(clip, score, starts)
+    return clip, Truth(aloft == 0.0, strikes, authored_actions(score, starts, FPS))
+
+
+WEIGHT_TIME = 0.09  # s in which weight goes from foot to foot
+
+
+def _weight(feet: np.ndarray, aloft: np.ndarray, share: float) -> np.ndarray:
+    """How the pelvis leans [F, 3] towards the foot that carries it."""
+    between = feet[:, 1, :3] - feet[:, 0, :3]
+    between[:, 1] = 0.0
+    lifted = gaussian_filter1d(aloft[:, 0] - aloft[:, 1], WEIGHT_TIME * FPS, mode="nearest")
+    return share * lifted[:, None] * gaussian_filter1d(between, WEIGHT_TIME * FPS, axis=0)
 
 
 def _channels(
     score: Sequence[Performed], starts: Sequence[float], total: float, style: Style
 ) -> dict[str, _Track]:
-    tracks = {c: _Track(np.array(v)) for c, v in style.guard.items()}
-    for track in tracks.values():
-        track.add(0.0, track.guard)
+    """Every channel's keys. Hands and feet have a fourth number: 1 where they are carried along (by
+    the head, by the step), 0 where the place is one in the stance.
+    """
+    tracks = {}
+    for c, v in (UNMOVED | dict(style.guard)).items():
+        limb = c in HANDS + FEET
+        tracks[c] = _Track(
+            np.array([*v, 1.0] if limb else v), FIST_SMOOTHING if limb else SMOOTHING
+        )
+        tracks[c].add(0.0, tracks[c].guard)
     for p, start in zip(score, starts):
         end = start + p.move.seconds * p.tempo
         for c in p.move.keys:
             if c not in tracks:
-                raise unknown(f"channel of {p.move.label}", c, style.guard)
+                raise unknown(f"channel of {p.move.label}", c, tracks)
         for c, track in tracks.items():
             rows = p.move.keys.get(c, ())
-            if p.move.holds:
+            if p.move.from_guard:
                 track.add(start, track.guard)
-            blow = 0
+            mine = iter([k for k, b in enumerate(p.move.blows) if b.limb == c])
+            blow, landed = next(mine, None), -1.0
             for time, value in rows:
-                if not (0 < time < p.move.seconds or (time == 0 and not p.move.holds)):
+                if not (0 < time < p.move.seconds or (time == 0 and not p.move.from_guard)):
                     raise KumiteError(
                         f"{p.move.label}: {c} has a key at {time} s; expected between 0 and "
                         f"{p.move.seconds} s"
                     )
-                moment = start + time * p.tempo
                 if isinstance(value, Aim):
-                    mine = [b for b, x in enumerate(p.move.blows) if x.limb == c]
-                    if not mine:
+                    if blow is None:
                         raise KumiteError(f"{p.move.label}: {c} aims, but strikes no blow")
-                    blow = mine[min(blow, len(mine) - 1)]
-                    track.add(moment, _aimed(p.targets[blow], value))
-                elif c.endswith("_hand"):
-                    track.add(moment, np.array(value))
+                    # Keys aim at a limb's next blow until half a second after it has landed.
+                    landed = p.move.blows[blow].time
+                    if time > landed + FOLLOW_THROUGH:
+                        blow = next(mine, blow)
+                    new = np.array([*_aimed(p.targets[blow], value), 0.0])
+                elif isinstance(value, Put):
+                    new = np.array([*value.place, 0.0])
+                elif c in HANDS:
+                    new = np.array([*value, 1.0])
+                elif c == "blade":
+                    new = np.array(value)
+                elif c in FEET:
+                    new = track.guard + np.array([*value, 0.0])
                 else:
-                    track.add(moment, track.guard + np.array(value))
-            if p.move.holds:
+                    new = track.guard + np.array(value)
+                track.add(start + time * p.tempo, new)
+            if p.move.to_guard:
                 track.add(end, track.guard)
     for track in tracks.values():
         track.add(total, track.guard)
     return tracks
+
+
+FOLLOW_THROUGH = 0.16  # s after a blow in which its limb's keys still aim at the same target
 
 
 def _aimed(target: tuple[float, float, float], value: Aim) -> np.ndarray:
@@ -212,94 +224,44 @@ def _aimed(target: tuple[float, float, float], value: Aim) -> np.ndarray:
     return (distance + ahead) * outward + left * sideways + np.array([0.0, height + up, 0.0])
 
 
-def _walk(
-    score: Sequence[Performed], starts: Sequence[float], at: np.ndarray, style: Style
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Stance frames [F, 3], feet [F, 2, 4] (ball [m] and yaw) and contacts [F, 2] of a take.
-
-    The stance glides while feet step; a foot that is not stepping does not move at all.
-    """
-    stance = _glide(score, starts, at)
-    feet = np.zeros((len(at), 2, 4))
-    on_ground = np.ones((len(at), 2), dtype=bool)
-    for s, side in enumerate(SIDES):
-        steps = [
-            (start + step.lift * p.tempo, start + step.land * p.tempo, step, p, start)
-            for p, start in zip(score, starts)
-            for step in p.move.steps
-            if step.foot == side
-        ]
-        down = _foothold(stance[0], side, style)
-        feet[:, s] = down
-        for n, (lift, land, step, p, start) in enumerate(steps):
-            again = steps[n + 1][0] if n + 1 < len(steps) else land
-            moment = start + p.move.seconds * p.tempo
-            if step.stride:
-                moment = 0.5 * (land + again) if n + 1 < len(steps) else at[-1]
-            goal = _foothold(stance[min(round(moment * FPS), len(at) - 1)], side, style)
-            u = (at - lift) / (land - lift)
-            move = goal - down
-            move[3] = (move[3] + np.pi) % (2 * np.pi) - np.pi
-            after = at > lift
-            feet[after, s] = (down + _ease(u)[:, None] * move)[after]
-            air = (u > 0) & (u < 1)
-            feet[air, s, 1] += step.height * np.sin(np.pi * _lean(u[air])) ** 2
-            on_ground[air, s] = False
-            down = down + move
-    return stance, feet, on_ground
+def _hands(
+    score: Sequence[Performed],
+    starts: Sequence[float],
+    at: np.ndarray,
+    stance: np.ndarray,
+    place: dict[str, np.ndarray],
+    alive: dict[str, np.ndarray],
+    pelvis: np.ndarray,
+    turned: dict[str, np.ndarray],
+    style: Style,
+) -> np.ndarray:
+    """Fists [F, 2, 3] in the world: carried by the head, aimed, put, or planted where they are."""
+    guard = [np.array(style.guard[c], dtype=float)[None] for c in ("pelvis", *TURNS)]
+    rest = trunk(guard[0], *(np.radians(g) for g in guard[1:])).at["Head"]
+    now = trunk(pelvis, *(turned[c] for c in TURNS)).at["Head"]
+    shift = planar_apply(planar_inverse(stance), now) - rest
+    out = []
+    for hand in HANDS:
+        there = place[hand][:, :3] + alive[hand] + place[hand][:, 3:] * shift
+        there = planar_apply(stance, there)
+        for p, start in zip(score, starts):
+            for plant in p.move.plants:
+                if plant.hand != hand:
+                    continue
+                begin, end = start + plant.start * p.tempo, start + plant.stop * p.tempo
+                middle = min(round(0.5 * (begin + end) * FPS), len(at) - 1)
+                spot = planar_apply(stance[middle], np.array(plant.place))
+                inside = np.minimum(at - begin, end - at) / plant.fade + 1.0
+                there += ease(inside)[:, None] * (spot - there)
+        out.append(there)
+    return np.stack(out, axis=1)
 
 
-def _glide(score: Sequence[Performed], starts: Sequence[float], at: np.ndarray) -> np.ndarray:
-    """Stance frames [F, 3]: each move's travel, carried out along an arc at its own pace."""
-    pace = np.zeros((len(at), 3))  # travelled in each frame, in the stance's own axes
-    for p, start in zip(score, starts):
-        if not np.any(np.abs(p.travel) > 1e-9):
-            continue
-        steps = p.move.steps
-        if not steps:
-            raise KumiteError(f"{p.move.label}: travels without a step")
-        if p.move.glide not in GLIDES:
-            raise unknown(f"glide of {p.move.label}", p.move.glide, GLIDES)
-        begin, end = start, start + p.move.seconds * p.tempo
-        if p.move.glide == "ease":
-            begin = start + min(s.lift for s in steps) * p.tempo - 0.04
-            end = start + max(s.land for s in steps) * p.tempo + 0.06
-        done = GLIDES[p.move.glide]((at - begin) / (end - begin))
-        x, z, yaw = p.travel
-        pace[1:] += np.diff(done)[:, None] * np.array([x, z, np.radians(yaw)])
-    # Half of a frame's turn comes before its shift and half after: arcs come out round.
-    yaw = np.cumsum(pace[:, 2])
-    mid = yaw - 0.5 * pace[:, 2]
-    x = np.cumsum(np.cos(mid) * pace[:, 0] + np.sin(mid) * pace[:, 1])
-    z = np.cumsum(-np.sin(mid) * pace[:, 0] + np.cos(mid) * pace[:, 1])
-    return np.stack([x, z, yaw], axis=1)
-
-
-def _foothold(stance: np.ndarray, side: str, style: Style) -> np.ndarray:
-    """Ball [3] and yaw of a foot that stands in a stance."""
-    x, z, yaw = style.feet[side]
-    ball = planar_apply(stance, np.array([x, BALL_HEIGHT, z]))
-    return np.array([*ball, stance[2] + np.radians(yaw)])
-
-
-def _ease(u: np.ndarray) -> np.ndarray:
-    """0 to 1 with no velocity and no acceleration at either end (minimum jerk)."""
-    u = np.clip(u, 0.0, 1.0)
-    return u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
-
-
-GLIDES = {
-    "ease": _ease,
-    "steady": lambda u: np.clip(u, 0.0, 1.0),
-    "start": lambda u: np.clip(u, 0.0, 1.0) ** 2,
-    "stop": lambda u: 1.0 - (1.0 - np.clip(u, 0.0, 1.0)) ** 2,
-}
-"""How a stance travels over a move, 0..1: from rest to rest, at one speed, from rest, to rest."""
-
-
-def _lean(u: np.ndarray) -> np.ndarray:
-    """A foot rises faster than it is put down."""
-    return u**0.85
+def _pointed(stance: np.ndarray, blade: np.ndarray) -> np.ndarray:
+    """The way of a blade [F, 3] in the world, from yaw and pitch [deg] in the stance."""
+    yaw, pitch = np.radians(blade[:, 0]) + stance[:, 2], np.radians(blade[:, 1])
+    flat = np.cos(pitch)
+    return np.stack([np.sin(yaw) * flat, np.sin(pitch), np.cos(yaw) * flat], axis=1)
 
 
 def _alive(at: np.ndarray, sway_share: float, rng: np.random.Generator) -> dict[str, np.ndarray]:
@@ -318,32 +280,6 @@ def _alive(at: np.ndarray, sway_share: float, rng: np.random.Generator) -> dict[
         "pelvis": np.stack([sway, bounce, sway_share * 0.005 * wave(0.37 * beat, 3)], axis=1),
         "chest_turn": np.stack([np.radians(1.2) * wave(0.6, 4), breath, zero], axis=1),
         "head_turn": np.stack([np.radians(1.0) * wave(0.4, 5), 0.4 * breath, zero], axis=1),
-        "left_hand": np.stack([0.006 * wave(0.9, 6), bounce + 0.006 * wave(0.7, 7), sway], axis=1),
-        "right_hand": np.stack([0.005 * wave(0.8, 4), bounce + 0.005 * wave(0.6, 6), sway], axis=1),
+        "left_hand": np.stack([0.006 * wave(0.9, 6), 0.006 * wave(0.7, 7), zero], axis=1),
+        "right_hand": np.stack([0.005 * wave(0.8, 4), 0.005 * wave(0.6, 6), zero], axis=1),
     }
-
-
-def _strikes(clip: Clip, score: Sequence[Performed], starts: Sequence[float]) -> tuple[Strike, ...]:
-    position, world = forward_kinematics(clip.skeleton, clip.root_position, clip.wxyz)
-    out = []
-    for p, start in zip(score, starts):
-        for blow in p.move.blows:
-            frame = round((start + blow.time * p.tempo) * clip.fps)
-            window = slice(frame - 1, frame + 2)
-            tip = tip_positions(clip.skeleton, blow.limb, position[window], world[window])
-            out.append(Strike(frame, blow.limb, tip[1], (tip[2] - tip[0]) * clip.fps / 2))
-    return tuple(sorted(out, key=lambda s: s.frame))
-
-
-def _actions(score: Sequence[Performed], starts: Sequence[float]) -> tuple[Action, ...]:
-    out = []
-    for p, start in zip(score, starts):
-
-        def frame(time: float, start: float = start, tempo: float = p.tempo) -> int:
-            return round((start + time * tempo) * FPS)
-
-        m = p.move
-        avoid = None if m.avoid is None else (frame(m.avoid[0]), frame(m.avoid[1]))
-        mark = None if m.mark is None else frame(m.mark)
-        out.append(Action(frame(0.0), frame(m.seconds), m.kind, m.label, avoid, mark))
-    return tuple(out)

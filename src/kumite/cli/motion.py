@@ -1,0 +1,322 @@
+"""Commands for motion: files, the performer, how like people they move, libraries."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from kumite.cli.app import JsonOption, Stages, app, err, out, print_json, progress
+from kumite.errors import KumiteError
+
+SHORTEST_ACTION = 0.25  # s; below it a graph is too fine to fight by
+
+Source = Annotated[
+    list[str], typer.Argument(help="Mocap: a folder, a glob, .bvh files, .amc files.")
+]
+ScaleOption = Annotated[
+    float | None, typer.Option(help="Length of the files' unit [m] (else inferred).")
+]
+UpOption = Annotated[str | None, typer.Option(help="Up axis of the files, Y or Z (else inferred).")]
+GroundOption = Annotated[
+    float | None, typer.Option(help="Height of the floor in the files [m] (else inferred).")
+]
+RoleOption = Annotated[
+    list[str] | None,
+    typer.Option("--role", help="ROLE=JOINT, where names say too little; may be repeated."),
+]
+FpsOption = Annotated[float | None, typer.Option(help="Resample to this rate [frames/s].")]
+FileFpsOption = Annotated[
+    float | None, typer.Option(help="The files' own rate, where they do not state it.")
+]
+
+
+def _roles(pairs: list[str] | None) -> dict[str, str]:
+    roles = {}
+    for pair in pairs or []:
+        role, equals, joint = pair.partition("=")
+        if not equals:
+            raise KumiteError(f"--role {pair!r}: expected ROLE=JOINT, such as left_hand=LWrist")
+        roles[role] = joint
+    return roles
+
+
+def _load_clips(source: list[str], fps, file_fps, metres_per_unit, up_axis, ground, role) -> Any:
+    from kumite import mocap
+
+    with progress() as bars:
+        Stages(bars)("reading motion capture")
+        return mocap.load(
+            source,
+            fps=fps,
+            file_fps=file_fps,
+            metres_per_unit=metres_per_unit,
+            up_axis=up_axis,
+            ground=ground,
+            roles=_roles(role),
+        )
+
+
+@app.command()
+def info(
+    source: Source,
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw where blows land, from front, top and side.")
+    ] = None,
+    as_json: JsonOption = False,
+    fps: FpsOption = None,
+    file_fps: FileFpsOption = None,
+    metres_per_unit: ScaleOption = None,
+    up_axis: UpOption = None,
+    ground: GroundOption = None,
+    role: RoleOption = None,
+) -> None:
+    """What is in motion capture files: rates, lengths, blows, and all that was inferred."""
+    from kumite.annotate import Strikes, find_strikes
+    from kumite.clip import LIMBS, check, concatenate
+
+    loaded = _load_clips(source, fps, file_fps, metres_per_unit, up_axis, ground, role)
+    hits: dict[str, dict[str, int]] = {}
+    every: list[Strikes] = []
+    for group in loaded.by_skeleton():
+        clips = concatenate(group)
+        strikes = find_strikes(clips)
+        every.append(strikes)
+        owner = clips.clip_of_frame[strikes.frame]
+        for c, name in enumerate(clips.names):
+            hits[name] = {
+                limb: int(((owner == c) & (strikes.limb == k)).sum())
+                for k, limb in enumerate(LIMBS)
+            }
+    scales = sorted({i.metres_per_unit for i in loaded.info})
+    problems = [p for clip in loaded.clips for p in check(clip)]
+    if plot is not None:
+        from kumite.export.plot import plot_hits
+
+        if len(every) != 1:
+            raise KumiteError(
+                f"--plot: the clips are of {len(every)} skeletons; expected one (name fewer files)"
+            )
+        plot_hits(plot, every[0], " ".join(source))
+    if as_json:
+        print_json(
+            {
+                "clips": [
+                    {
+                        "name": clip.name,
+                        "fps": clip.fps,
+                        "frames": len(clip),
+                        "seconds": round(clip.seconds, 4),
+                        "hits": hits[clip.name],
+                        "source": str(i.source),
+                        "metres_per_unit": i.metres_per_unit,
+                        "facts": [str(f) for f in i.facts],
+                    }
+                    for clip, i in zip(loaded.clips, loaded.info)
+                ],
+                "metres_per_unit": scales[0] if len(scales) == 1 else scales,
+                "roles": dict(loaded.info[0].roles),
+                "problems": problems,
+            }
+        )
+        return
+    table = Table(title=f"{len(loaded.clips)} clips, {sum(c.seconds for c in loaded.clips):.1f} s")
+    for column in ("clip", "fps", "frames", "seconds", *(n.replace("_", " ") for n in LIMBS)):
+        is_name = column == "clip"  # kept whole: cut short, two could look the same
+        table.add_column(column, justify="left" if is_name else "right", no_wrap=is_name)
+    for clip in loaded.clips:
+        row = (f"{clip.fps:g}", str(len(clip)), f"{clip.seconds:.2f}")
+        table.add_row(clip.name, *row, *(str(hits[clip.name][limb] or "·") for limb in LIMBS))
+    out.print(table)
+    for line in loaded.report():
+        out.print(line, markup=False, highlight=False)
+    for line in problems:
+        err.print(f"warning: {line}", markup=False, highlight=False)
+    if plot is not None:
+        out.print(f"wrote {plot}", markup=False, highlight=False)
+
+
+@app.command()
+def build(
+    source: Source,
+    output: Annotated[Path, typer.Option("--output", "-o", help="The library file to write.")],
+    event: Annotated[
+        str, typer.Option(help="Join where a foot lifts off: left, right, both; or none: anywhere.")
+    ] = "left",
+    per_second: Annotated[
+        float, typer.Option(help="Wanted transitions per second of capture.")
+    ] = 52.0,
+    as_json: JsonOption = False,
+    fps: FpsOption = None,
+    file_fps: FileFpsOption = None,
+    metres_per_unit: ScaleOption = None,
+    up_axis: UpOption = None,
+    ground: GroundOption = None,
+    role: RoleOption = None,
+) -> None:
+    """Build a library: clips, contacts, effective hits and the motion graph, in one file."""
+    from kumite.files import refuse_unwritable
+    from kumite.graph import build_library, save_library
+
+    refuse_unwritable(output)  # before the work, not after
+    loaded = _load_clips(source, fps, file_fps, metres_per_unit, up_axis, ground, role)
+    with progress() as bars:
+        library = build_library(
+            loaded.clip_set(), event=event, per_second=per_second, progress=Stages(bars)
+        )
+    save_library(output, library)
+    r = library.report
+    if as_json:
+        print_json({**r, "output": str(output), "clips": len(library.clips.names)})
+        return
+    for line in loaded.report():
+        out.print(line, markup=False, highlight=False)
+    lines = (
+        f"{r['frames']} frames of {len(library.clips.names)} clips at {r['fps']:g} frames/s, "
+        f"{r['hits']} blows",
+        f"{r['frames_kept']} frames connected, {r['hits_kept']} blows in them: "
+        f"{r['states']} states, {r['actions']} actions of {r['mean_action_s']:.2f} s on average",
+        f"{r['transitions']} transitions of {r['candidates']} candidates "
+        f"({'anywhere' if r['event'] == 'none' else r['event'] + ' lift-off'}), "
+        f"mean join cost {r['mean_join_cost']:.2f}, accepted below {r['threshold']:.2f}",
+        f"wrote {output} ({output.stat().st_size / 1e6:.1f} MB)",
+    )
+    for line in lines:
+        out.print(line, markup=False, highlight=False)
+    if r["mean_action_s"] < SHORTEST_ACTION:
+        err.print(
+            f"warning: actions last {r['mean_action_s']:.2f} s on average; fighters look one "
+            "action ahead and will dither: join at a foot's lift-off (--event left, right or both)",
+            markup=False,
+            highlight=False,
+        )
+
+
+@app.command()
+def perform(
+    style: Annotated[
+        str | None, typer.Argument(help="A style of the built-in performer (default: list them).")
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="A folder for a BVH and a truth file of every clip."),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same bytes.")] = 0,
+    mirrored: Annotated[bool, typer.Option(help="Every clip once more, seen in a mirror.")] = True,
+    as_json: JsonOption = False,
+) -> None:
+    """The built-in performer's clips: list them, or write them as BVH with what is true of them."""
+    from kumite.performer import STYLES
+    from kumite.performer import perform as perform_style
+
+    if style is None:
+        if output is not None:
+            raise KumiteError(f"--output: name a style to write ({', '.join(STYLES)})")
+        styles = {
+            name: {"takes": list(s.takes), "moves": [m.label for m in s.moves]}
+            for name, s in STYLES.items()
+        }
+        if as_json:
+            print_json(styles)
+            return
+        for name, what in styles.items():
+            line = f"{name:12} {len(what['takes'])} takes of {len(what['moves'])} moves"
+            out.print(line, markup=False, highlight=False)
+        return
+    with progress() as bars:
+        stage = Stages(bars)
+        stage(f"performing {style}")
+        made = perform_style(style, seed, mirrored=mirrored)
+        if output is not None:
+            _write_performance(output, made, stage)
+    rows = [
+        {
+            "clip": clip.name,
+            "seconds": round(clip.seconds, 2),
+            "actions": len(truth.actions),
+            "blows": len(truth.strikes),
+        }
+        for clip, truth in zip(made.clips, made.truth)
+    ]
+    if as_json:
+        print_json(rows)
+        return
+    total = sum(clip.seconds for clip in made.clips)
+    table = Table(
+        title=f"{style}: {len(rows)} clips, {total:.1f} s at {made.clips[0].fps:g} frames/s"
+    )
+    for column in rows[0]:
+        table.add_column(column, justify="left" if column == "clip" else "right", no_wrap=True)
+    for row in rows:
+        table.add_row(*map(str, row.values()))
+    out.print(table)
+    if output is not None:
+        out.print(f"wrote {len(rows)} clips to {output}", markup=False, highlight=False)
+
+
+def _write_performance(folder: Path, made: Any, stage: Stages) -> None:
+    import json
+
+    from kumite.export.bvh import write_bvh
+    from kumite.files import writing
+    from kumite.performer import truth_to_json
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise KumiteError(f"{folder}: cannot be made ({error.strerror})") from None
+    for clip, truth in zip(made.clips, made.truth):
+        stage(f"writing {clip.name}")
+        write_bvh(folder / f"{clip.name}.bvh", clip)
+        with writing(folder / f"{clip.name}.truth.json") as temporary:
+            text = json.dumps(truth_to_json(truth), indent=1)
+            temporary.write_text(text + "\n", encoding="utf-8")
+
+
+@app.command()
+def likeness(
+    source: Annotated[
+        list[str] | None, typer.Argument(help="Mocap: a folder, a glob, .bvh files, .amc files.")
+    ] = None,
+    style: Annotated[
+        list[str] | None,
+        typer.Option(help="A style of the built-in performer; may be repeated."),
+    ] = None,
+    as_json: JsonOption = False,
+    file_fps: FileFpsOption = None,
+    metres_per_unit: ScaleOption = None,
+    up_axis: UpOption = None,
+    ground: GroundOption = None,
+    role: RoleOption = None,
+) -> None:
+    """How like a person clips move: joints, foot skate, balance, blows and steps, side by side."""
+    from kumite.annotate import measure_likeness
+    from kumite.clip import concatenate
+    from kumite.performer import perform as perform_style
+
+    if not source and not style:
+        raise KumiteError("name motion capture files, or a --style of the built-in performer")
+    found = {}
+    if source:
+        loaded = _load_clips(source, None, file_fps, metres_per_unit, up_axis, ground, role)
+        for k, group in enumerate(loaded.by_skeleton()):
+            name = " ".join(source) if k == 0 else f"{' '.join(source)} ({k + 1})"
+            found[name] = measure_likeness(concatenate(group))
+    for name in style or []:
+        found[name] = measure_likeness(concatenate(perform_style(name, mirrored=False).clips))
+    if as_json:
+        print_json({name: m.to_json() for name, m in found.items()})
+        return
+    table = Table(title="5th, 50th and 95th percentiles, where three numbers are given")
+    table.add_column("", no_wrap=True)
+    for name in found:
+        table.add_column(name, justify="right")
+    columns = [m.rows() for m in found.values()]
+    for k, (label, _) in enumerate(columns[0]):
+        table.add_row(label, *(rows[k][1] for rows in columns))
+    out.print(table)
+    for name, m in found.items():
+        for line in m.outside():
+            err.print(f"warning: {name}: {line}", markup=False, highlight=False)

@@ -1,0 +1,253 @@
+"""Commands for scenes: run them, score and export recordings, watch them, measure."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from kumite.cli.app import JsonOption, Stages, Training, app, out, print_json, progress
+from kumite.errors import KumiteError, unknown
+
+LibraryOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--library", "-l", help="A library built with 'kumite build' (default: built-in)."
+    ),
+]
+
+
+@app.command()
+def scenes(as_json: JsonOption = False) -> None:
+    """The built-in scenes."""
+    from kumite.scene import builtin_scenes
+
+    found = builtin_scenes()
+    if as_json:
+        print_json({name: s.model_dump(mode="json") for name, s in found.items()})
+        return
+    for name, settings in found.items():
+        out.print(f"{name:12} {settings.about}", markup=False, highlight=False)
+
+
+def _live_scene(scene: str, library: Path | None, seed: int) -> Any:
+    """A scene ready to run: library read or performed, policies trained or found."""
+    from kumite.control import cache_folder
+    from kumite.graph import builtin_library, load_library
+    from kumite.scene import LiveScene, load_scene
+
+    settings = load_scene(scene)  # before any long work: a wrong name is said at once
+    cache = cache_folder(library)
+    with progress() as bars:
+        stages = Stages(bars)
+        if library is not None:
+            stages("reading the library")
+            found = load_library(library)
+        else:
+            found = builtin_library(cache, progress=stages)
+        stages("preparing the scene")
+        return LiveScene(settings, found, seed=seed, cache=cache, progress=Training(bars))
+
+
+@app.command()
+def run(
+    scene: Annotated[str, typer.Argument(help="A built-in scene or a .toml scene file.")],
+    library: LibraryOption = None,
+    seconds: Annotated[float, typer.Option(help="How long [s].")] = 30.0,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same bytes.")] = 0,
+    output: Annotated[
+        list[Path] | None,
+        typer.Option("--out", "-o", help="Write .rec, .glb, .bvh or .png; may be repeated."),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Run a scene without drawing, record it, and print how good it is."""
+    from kumite.scene import load_scene, measure, record
+
+    _check_outputs(output or [], [c.name for c in load_scene(scene).character])
+    live = _live_scene(scene, library, seed)
+    with progress() as bars:
+        task = bars.add_task(f"running {scene}", total=1.0, note="")
+        recording = record(live, seconds, lambda share: bars.update(task, completed=share))
+    for path in output or []:
+        _export(recording, path)
+    _show_metrics(measure(recording), as_json)
+    if not as_json:
+        for path in output or []:
+            out.print(f"wrote {path}", markup=False, highlight=False)
+
+
+def _show_metrics(metrics: Any, as_json: bool) -> None:
+    if as_json:
+        print_json(metrics.to_json())
+        return
+    table = Table(title=f"{metrics.seconds:.1f} s")
+    columns = ("", "thrown", "landed", "skate m/s", "of source", "facing", "join jump m/s", "joins")
+    for column in (*columns, "variety"):
+        table.add_column(column, justify="right")
+    for c in metrics.characters:
+        ratio = "" if c.skate_ratio is None else f"{c.skate_ratio:.2f}"
+        facing = "" if c.facing_share is None else f"{c.facing_share:.0%}"
+        table.add_row(
+            c.name,
+            str(c.thrown),
+            str(c.landed),
+            f"{c.skate_m_s:.3f}",
+            ratio,
+            facing,
+            f"{c.join_jump_m_s:.2f}",
+            str(c.joins),
+            f"{c.variety:.0%}",
+        )
+    out.print(table)
+    if metrics.min_separation_m is not None:
+        out.print(f"smallest distance between bodies: {metrics.min_separation_m:.2f} m")
+
+
+@app.command()
+def metrics(
+    recording: Annotated[Path, typer.Argument(help="A .rec file.")], as_json: JsonOption = False
+) -> None:
+    """Score a recording: hits, foot skate, distances, facing, joins."""
+    from kumite.scene import load_recording, measure
+
+    _show_metrics(measure(load_recording(recording)), as_json)
+
+
+EXPORTS = (".rec", ".glb", ".bvh", ".png")
+
+
+def _exporter(path: Path) -> str:
+    suffix = path.suffix.lower()
+    if suffix not in EXPORTS:
+        raise unknown(f"ending of {path}", suffix, EXPORTS)
+    return suffix
+
+
+def _check_outputs(paths: list[Path], names: Sequence[str]) -> None:
+    """What cannot be written of these characters is said before the work, not after."""
+    from kumite.files import refuse_unwritable
+
+    for path in paths:
+        if _exporter(path) == ".bvh" and len(names) > 1:
+            raise KumiteError(
+                f"{path}: a BVH file holds one character; choose with "
+                f"'kumite export RECORDING -o {path} --character NAME' ({', '.join(names)})"
+            )
+        refuse_unwritable(path)
+
+
+def _export(recording: Any, path: Path) -> None:
+    suffix = _exporter(path)
+    if suffix == ".rec":
+        from kumite.scene import save_recording
+
+        save_recording(path, recording)
+    elif suffix == ".glb":
+        from kumite.export.gltf import write_glb
+
+        write_glb(path, recording)
+    elif suffix == ".bvh":
+        from kumite.export.bvh import write_bvh
+
+        write_bvh(path, recording.clip(recording.names[0]))
+    else:
+        from kumite.export.sheet import recording_sheet
+
+        recording_sheet(path, recording)
+
+
+@app.command()
+def export(
+    recording: Annotated[Path, typer.Argument(help="A .rec file.")],
+    output: Annotated[
+        list[Path],
+        typer.Option("--output", "-o", help="Write .glb, .bvh or .png; may be repeated."),
+    ],
+    character: Annotated[
+        str | None, typer.Option(help="Which character (a BVH file holds one).")
+    ] = None,
+) -> None:
+    """Write a recording as GLB (all characters), BVH (one of them) or a contact sheet."""
+    from kumite.scene import load_recording
+
+    loaded = load_recording(recording)
+    if character is not None:
+        loaded = loaded.only(character)
+    _check_outputs(output, loaded.names)
+    for path in output:
+        _export(loaded, path)
+        out.print(f"wrote {path}", markup=False, highlight=False)
+
+
+@app.command()
+def studio(
+    scene: Annotated[
+        str, typer.Argument(help="A built-in scene, a .toml scene file, or a .rec file.")
+    ] = "sparring",
+    library: LibraryOption = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the scene.")] = 0,
+    host: Annotated[
+        str, typer.Option(help="Address to listen on; others than 127.0.0.1 let others in.")
+    ] = "127.0.0.1",
+    port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="Port; 0 takes any free one.")
+    ] = None,
+    seconds: Annotated[float | None, typer.Option(help="End by itself after this time.")] = None,
+    browser: Annotated[bool, typer.Option(help="Open a browser where there is one.")] = True,
+) -> None:
+    """Watch a scene live in the browser, or play a recording."""
+    from kumite.scene import Playback, load_recording
+    from kumite.studio import serve
+
+    if seconds is None and os.environ.get("DEMO_SECONDS"):
+        try:
+            seconds = float(os.environ["DEMO_SECONDS"])
+        except ValueError:
+            raise KumiteError(
+                f"DEMO_SECONDS={os.environ['DEMO_SECONDS']!r}: expected a number of seconds"
+            ) from None
+    if scene.endswith(".rec"):
+        stage: Any = Playback(load_recording(scene))
+    else:
+        stage = _live_scene(scene, library, seed)
+    serve(
+        stage,
+        host=host,
+        port=8080 if port is None else port,
+        strict_port=port is not None,
+        open_browser=browser,
+        seconds=seconds,
+        announce=lambda line: out.print(line, markup=False, highlight=False),
+    )
+
+
+@app.command()
+def bench(
+    folder: Annotated[
+        Path | None, typer.Argument(help="Boxer mocap (default: KUMITE_MOCAP, else built-in).")
+    ] = None,
+    only: Annotated[str | None, typer.Option(help="Only benchmarks whose name holds this.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure the figures: times, rates, peak memory."""
+    from kumite.bench import run_all
+
+    with progress() as bars:
+        rows = run_all(folder, only, Stages(bars))
+    if as_json:
+        print_json(rows)
+        return
+    table = Table()
+    for column in ("figure", "value", "unit", "wanted", "peak MB"):
+        table.add_column(column, justify="left" if column in ("figure", "unit") else "right")
+    for row in rows:
+        limit = "" if row["limit"] is None else f"{row['limit']:g}"
+        table.add_row(
+            row["name"], f"{row['value']:.4g}", row["unit"], limit, f"{row['peak_mb']:.0f}"
+        )
+    out.print(table)
