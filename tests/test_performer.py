@@ -250,7 +250,7 @@ def test_elbows_and_knees_bend_one_way(performance: Performance, worlds):
 
 
 def test_motion_is_continuous(performance: Performance):
-    """No joint jumps: a frame differs from the next by less than a fast arm turns in a 60th (the real
+    """No joint jumps: a frame differs from the next by what a fast arm turns in a 60th (the real
     boxer's elbow opens at up to 3100 degrees a second, a sword's wrist rolls faster still).
     """
     for clip in performance.clips:
