@@ -13,6 +13,7 @@ from kumite.graph import Library
 from kumite.kernels import character as kernels
 from kumite.kernels import pose
 from kumite.synthesis import Cast
+from kumite.synthesis.cast import _below
 from tests import toys
 
 
@@ -51,7 +52,8 @@ def test_two_bone_reach(seed):
     length = np.linalg.norm(goal - position[hip])
     kept = world[foot].copy()
     w, p, q = wxyz.copy(), position.copy(), world.copy()
-    kernels.reach(hip, knee, foot, goal, s.parents, s.offsets, root, w, p, q)
+    below = _below(s, [[hip, knee, foot]])[0]
+    kernels.reach(hip, knee, foot, below, goal, s.parents, s.offsets, w, p, q)
     again, turned = (a[0] for a in forward_kinematics(s, root[None], w[None]))
     assert np.allclose(again, p, atol=1e-9)
     assert rotation.angle(turned[foot], kept) < 1e-6
@@ -75,7 +77,8 @@ def test_a_straight_leg_bends_its_knee_forward():
     pose.forward_kinematics_frame(s.parents, straight, root, wxyz, position, world)
     hip, knee, foot = (s.joint(f"right_{p}") for p in ("thigh", "shin", "foot"))
     goal = position[foot] + [0.0, 0.2, 0.0]
-    kernels.reach(hip, knee, foot, goal, s.parents, straight, root, wxyz, position, world)
+    below = _below(s, [[hip, knee, foot]])[0]
+    kernels.reach(hip, knee, foot, below, goal, s.parents, straight, wxyz, position, world)
     assert np.allclose(position[foot], goal, atol=1e-5)
     assert position[knee, 2] > 0.2
 
@@ -139,10 +142,13 @@ def _walk(library: Library, frames: int, seed: int):
     contacts, root = [cast.contacts], [cast.root_position.copy()]
     for _ in range(frames):
         jump = np.zeros(2, bool)
-        for k in cast.waiting:
+        stretch = np.zeros(2, dtype=np.int64)
+        who = cast.waiting
+        for k in who:
             s = int(np.searchsorted(table.state_frame, cast.frame[k]))
             a = table.actions_of(s)
-            jump[k] = cast.begin(int(k), int(table.stretch[rng.integers(a.start, a.stop)]))
+            stretch[k] = table.stretch[rng.integers(a.start, a.stop)]
+        jump[who] = cast.begin(who, stretch)[who]
         cast.advance()
         position.append(cast.position.copy())
         joined.append(jump)
@@ -169,7 +175,7 @@ def test_without_joins_the_capture_is_played_as_it_is(library: Library):
     f = int(table.state_frame[state])
     k = int(np.flatnonzero(table.first == f + 1)[0])
     cast.place(0, state, clips.facing[f])
-    assert cast.begin(0, k) is False
+    assert not cast.begin(np.array([0]), np.array([k]))[0]
     position, _ = clips.world
     while cast.frame[0] < cast.stop[0]:
         cast.advance()
@@ -221,7 +227,8 @@ def test_shifting_a_body_leaves_its_planted_feet(library: Library):
     s = library.clips.skeleton
     feet = [s.joint("left_foot"), s.joint("right_foot")]
     before, root = cast.position[0, feet].copy(), cast.root_position[0].copy()
-    cast.shift(0, 0.02, -0.01)
+    cast.anchor[0, :2] += [0.02, -0.01]
+    cast.foot_offset[0] -= [0.02, 0.0, -0.01]
     cast.show(0.0)
     assert np.allclose(cast.root_position[0] - root, [0.02, 0, -0.01], atol=1e-9)
     assert np.allclose(cast.position[0, feet], before, atol=2e-3)
@@ -269,7 +276,9 @@ def test_many_characters_are_what_few_are(library: Library):
     for cast in (few, many):
         for k in range(cast.count):
             cast.place(k, 1, np.array([0.3, 0.1, 0.7]))
-            cast.begin(k, int(library.table.stretch[library.table.actions_of(1)][0]))
+        first = library.table.stretch[library.table.actions_of(1)][0]
+        everyone = np.arange(cast.count)
+        cast.begin(everyone, np.full(cast.count, first))
         cast.advance()
     assert np.array_equal(many.wxyz, np.broadcast_to(few.wxyz, many.wxyz.shape))
     assert np.array_equal(many.position, np.broadcast_to(few.position, many.position.shape))

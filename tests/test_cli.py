@@ -174,6 +174,11 @@ def test_likeness_is_shown_side_by_side(kumite, tmp_path: Path):
     assert 0.8 < both["walks/walk.bvh"]["step_length"][1] < 1.4
 
 
+def test_a_crowd_of_any_number(kumite, built: Path):
+    status, text, _ = kumite("run", "crowd", "-l", built, "--count", "44", "--seconds", "4")
+    assert status == 0 and "4.0 s, 44 characters:" in text and "blows thrown" in text
+
+
 def test_scenes_are_listed(kumite):
     status, text, _ = kumite("scenes")
     assert status == 0 and "sparring" in text and "target" in text
@@ -265,6 +270,9 @@ def test_two_skeletons_in_one_library(kumite, tmp_path):
         (["studio", "none.rec"], "none.rec: cannot be read"),
         (["bench", "--only", "nothing like it"], "no figure"),
         (["info", "still.bvh", "--plot", "x.png"], "no effective hits"),
+        (["run", "sparring", "-l", "BUILT", "--count", "9"], "expected a scene with a [crowd]"),
+        (["run", "crowd", "-l", "BUILT", "--count", "1"], "count: 1, expected at least 2"),
+        (["run", "crowd", "-l", "BUILT", "--count", "999999999"], "do not fit into memory; at"),
         (["perform", "swrod"], "did you mean 'sword'"),
         (["perform", "-o", "x"], "name a style to write"),
         (["perform", "sword", "-o", "still.bvh/x"], "still.bvh/x: cannot be made"),

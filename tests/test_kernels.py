@@ -14,17 +14,18 @@ import kumite
 
 TIP = """
 import numpy as np
-from kumite.kernels import blow
-tip = np.zeros((1, 1, 3))
-turn = np.array([[[1.0, 0, 0, 0]]])
-blow.limb_tips(np.zeros((1, 1, 3)), turn, np.array([0]), np.array([[1.0, 2.0, 3.0]]), tip)
-print(tip[0, 0, 0])
+from kumite.kernels import character
+position, turn = np.zeros((2, 3)), np.array([[1.0, 0, 0, 0], [1.0, 0, 0, 0]])
+bones = np.array([[0.0, 0, 0], [1.0, 2.0, 3.0]])
+parents = np.array([-1, 0])
+character.pose_below(np.array([1, -1]), parents, bones, turn, position, turn.copy())
+print(position[1, 0])
 """
 
 
 @pytest.mark.slow
 def test_compiled_code_is_not_kept_when_a_kernel_that_it_calls_changes(tmp_path: Path):
-    """``blow.limb_tips`` calls ``pose.add_rotated``, which lives in another file."""
+    """``character.pose_below`` calls ``pose.add_rotated``, which lives in another file."""
     package = tmp_path / "kumite"
     shutil.copytree(
         Path(kumite.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__")

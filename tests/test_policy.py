@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from kumite.annotate import Contacts, Strikes
 from kumite.control import (
     Behaviour,
-    Fighter,
+    Fighters,
     Skill,
     TargetGrid,
     Temper,
@@ -207,13 +207,14 @@ def test_look_ahead_agrees_with_the_table_for_a_standing_target(library: Library
         grid = policy.behaviour.grid
         temper = Temper(*weights, facing=0.0, few=1, slack=0.0, boredom=0.0, personal_space=0.0)
         for m in range(1, len(grid), 7):
-            fighter = Fighter(skill, temper, np.random.default_rng(0))
-            far = np.full((1, 2), 1e6)
+            fighter = Fighters(skill, [temper], 0)
+            far = np.full((1, 1, 2), 1e6)
             for state in (0, library.table.states // 2):
-                choice = fighter.choose(state, grid.points[m][None], far)
+                fighter.pick(0, state, grid.points[m][None], far)
                 # Points on the rim may leave the grid by rounding and then count as 0.
                 if policy.value[state, m] > 1e-3:
-                    assert choice.worth == pytest.approx(policy.value[state, m], rel=2e-3)
+                    worth = fighter.choices.worth[0]
+                    assert worth == pytest.approx(policy.value[state, m], rel=2e-3)
 
 
 def test_fighters_keep_their_space_and_do_not_repeat_themselves(library: Library):
@@ -225,18 +226,22 @@ def test_fighters_keep_their_space_and_do_not_repeat_themselves(library: Library
     )
     target = np.array([[0.0, 1.5, 0.7]])
     state = int(np.argmax(np.diff(library.table.action_start)))
-    bold = Fighter(skill, Temper(personal_space=0.0, few=1, boredom=0.0), np.random.default_rng(0))
-    picks = {bold.choose(state, target, target[:, [0, 2]]).stretch for _ in range(6)}
-    assert len(picks) == 1
-    bored = Fighter(skill, Temper(personal_space=0.0, few=1, boredom=0.9), np.random.default_rng(0))
-    assert len({bored.choose(state, target, target[:, [0, 2]]).stretch for _ in range(4)}) > 1
-    shy = Fighter(skill, Temper(personal_space=0.6), np.random.default_rng(0))
+    body = target[None][:, :, [0, 2]]
+
+    def picks(temper: Temper, times: int) -> tuple[Fighters, list[int]]:
+        mind = Fighters(skill, [temper], 0)
+        return mind, [mind.pick(0, state, target, body) for _ in range(times)]
+
+    _, bold = picks(Temper(personal_space=0.0, few=1, boredom=0.0), 6)
+    assert len(set(bold)) == 1
+    _, bored = picks(Temper(personal_space=0.0, few=1, boredom=0.9), 4)
+    assert len(set(bored)) > 1
+    shy, stretches = picks(Temper(personal_space=0.6), 10)
     tracks = skill.tracks
-    for _ in range(10):
-        choice = shy.choose(state, target, target[:, [0, 2]])
-        a, b = tracks.centre_start[choice.stretch : choice.stretch + 2]
+    for stretch in stretches:
+        a, b = tracks.centre_start[stretch : stretch + 2]
         gap = np.hypot(*(tracks.root[a:b, :2] - [0.0, 0.7]).T).min()
-        assert gap >= 0.6 or choice.apart == 0
+        assert gap >= 0.6 or shy.choices.apart[0] == 0
 
 
 def test_policies_are_found_again_by_content(library: Library, tmp_path):

@@ -131,7 +131,7 @@ def test_a_scene_file_is_read(tmp_path):
         ),
         ("a = " + "[" * 100_000, "not TOML"),
         ("title = ", "not TOML"),
-        ('title = "x"', "character: missing"),
+        ('title = "x"', "nobody is in it"),
     ],
 )
 def test_wrong_scene_files_name_the_key(tmp_path, text, message):

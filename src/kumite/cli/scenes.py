@@ -34,13 +34,25 @@ def scenes(as_json: JsonOption = False) -> None:
         out.print(f"{name:12} {settings.about}", markup=False, highlight=False)
 
 
-def _live_scene(scene: str, library: Path | None, seed: int) -> Any:
+CountOption = Annotated[
+    int | None, typer.Option(help="How many characters a scene with a crowd has.")
+]
+
+
+def _settings(scene: str, count: int | None) -> Any:
+    """The scene as it is to be run."""
+    from kumite.scene import load_scene, with_count
+
+    settings = load_scene(scene)
+    return settings if count is None else with_count(settings, count)
+
+
+def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
     """A scene ready to run: library read or performed, policies trained or found."""
     from kumite.control import cache_folder
     from kumite.graph import builtin_library, load_library
-    from kumite.scene import LiveScene, load_scene
+    from kumite.scene import LiveScene
 
-    settings = load_scene(scene)  # before any long work: a wrong name is said at once
     cache = cache_folder(library)
     with progress() as bars:
         stages = Stages(bars)
@@ -58,6 +70,7 @@ def run(
     scene: Annotated[str, typer.Argument(help="A built-in scene or a .toml scene file.")],
     library: LibraryOption = None,
     seconds: Annotated[float, typer.Option(help="How long [s].")] = 30.0,
+    count: CountOption = None,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same bytes.")] = 0,
     output: Annotated[
         list[Path] | None,
@@ -66,10 +79,12 @@ def run(
     as_json: JsonOption = False,
 ) -> None:
     """Run a scene without drawing, record it, and print how good it is."""
-    from kumite.scene import load_scene, measure, record
+    from kumite.scene import measure, record
 
-    _check_outputs(output or [], [c.name for c in load_scene(scene).character])
-    live = _live_scene(scene, library, seed)
+    settings = _settings(scene, count)  # before any long work: what is wrong is said at once
+    names = [c.name for c in settings.character]
+    _check_outputs(output or [], [*names, *(["the crowd"] if settings.crowd else [])])
+    live = _live_scene(settings, library, seed)
     with progress() as bars:
         task = bars.add_task(f"running {scene}", total=1.0, note="")
         recording = record(live, seconds, lambda share: bars.update(task, completed=share))
@@ -89,7 +104,8 @@ def _show_metrics(metrics: Any, as_json: bool) -> None:
     columns = ("", "thrown", "landed", "skate m/s", "of source", "facing", "join jump m/s", "joins")
     for column in (*columns, "variety"):
         table.add_column(column, justify="right")
-    for c in metrics.characters:
+    shown = metrics.characters if len(metrics.characters) <= MOST_SHOWN else ()
+    for c in shown:
         ratio = "" if c.skate_ratio is None else f"{c.skate_ratio:.2f}"
         facing = "" if c.facing_share is None else f"{c.facing_share:.0%}"
         table.add_row(
@@ -103,7 +119,17 @@ def _show_metrics(metrics: Any, as_json: bool) -> None:
             str(c.joins),
             f"{c.variety:.0%}",
         )
-    out.print(table)
+    if shown:
+        out.print(table)
+    else:
+        many = metrics.characters
+        out.print(
+            f"{metrics.seconds:.1f} s, {len(many)} characters: "
+            f"{sum(c.thrown for c in many)} blows thrown, {sum(c.landed for c in many)} landed, "
+            f"{sum(c.landed > 0 for c in many)} of them landed one; worst skate "
+            f"{max(c.skate_m_s for c in many):.3f} m/s, worst jump at a join "
+            f"{max(c.join_jump_m_s for c in many):.2f} m/s"
+        )
     if metrics.min_separation_m is not None:
         out.print(f"smallest distance between bodies: {metrics.min_separation_m:.2f} m")
 
@@ -118,6 +144,7 @@ def metrics(
     _show_metrics(measure(load_recording(recording)), as_json)
 
 
+MOST_SHOWN = 40  # characters, each in a row of its own
 EXPORTS = (".rec", ".glb", ".bvh", ".png")
 
 
@@ -190,6 +217,7 @@ def studio(
         str, typer.Argument(help="A built-in scene, a .toml scene file, or a .rec file.")
     ] = "sparring",
     library: LibraryOption = None,
+    count: CountOption = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the scene.")] = 0,
     host: Annotated[
         str, typer.Option(help="Address to listen on; others than 127.0.0.1 let others in.")
@@ -214,7 +242,7 @@ def studio(
     if scene.endswith(".rec"):
         stage: Any = Playback(load_recording(scene))
     else:
-        stage = _live_scene(scene, library, seed)
+        stage = _live_scene(_settings(scene, count), library, seed)
     serve(
         stage,
         host=host,

@@ -1,16 +1,20 @@
-"""A fighter: several behaviours at once by a weighted sum, random among the best few (A9)."""
+"""Fighters: several behaviours at once by a weighted sum, random among the best few (A9)."""
 
 from __future__ import annotations
 
-from collections import deque
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from kumite.control.policy import Policy, Tracks, frame_discount
 from kumite.errors import KumiteError
 from kumite.graph import Library
-from kumite.kernels import policy as kernels
+from kumite.kernels import crowd as kernels
+from kumite.kernels.policy import Moves, Worth
+
+MANY = 8  # characters that choose at once (1 ms of work) from which threads pay
 
 
 @dataclass
@@ -34,14 +38,6 @@ class Temper:
 
 
 @dataclass(frozen=True)
-class Choice:
-    stretch: int
-    worth: float
-    considered: int  # actions the state offers
-    apart: int  # of these, the ones that keep the personal space
-
-
-@dataclass(frozen=True)
 class Skill:
     """What all fighters of one library share: policies and the tracks of its actions."""
 
@@ -50,90 +46,104 @@ class Skill:
     strike: Policy
     tracks: Tracks
 
-
-@dataclass
-class Fighter:
-    """One character's mind: it sees where its target will be and picks the next action."""
-
-    skill: Skill
-    temper: Temper
-    rng: np.random.Generator
-    _recent: deque[int] = field(default_factory=deque)
-
-    def choose(self, state: int, target: np.ndarray, other: np.ndarray) -> Choice:
-        """Pick an action of ``state``.
-
-        target [H, 3]: the target's expected places at frames 1.. from now, other [H, 2] those of
-        the body to keep apart from; both in the avatar's facing frame, the last row from then on.
-        """
-        skill, temper = self.skill, self.temper
-        table, tracks = skill.library.table, skill.tracks
-        actions = table.actions_of(state)
-        worth = np.empty(actions.stop - actions.start)
-        gap = np.empty(len(worth))
-        fps = skill.library.clips.fps
-        near, hit = skill.approach, skill.strike
-        goal = _within(target, near.behaviour.grid.high[1])
-        kernels.look_ahead(
-            state,
-            goal,
-            target,
-            other,
+    @cached_property
+    def moves(self) -> Moves:
+        """The actions as the kernels take them."""
+        table, tracks = self.library.table, self.tracks
+        x, z, yaw = tracks.root.T
+        return Moves(
             table.action_start,
             table.stretch,
             table.target,
             table.displacement,
             table.duration,
-            frame_discount(near.behaviour, fps),
-            near.behaviour.sigma,
-            tracks.centre,
             tracks.centre_start,
-            near.value,
-            near.grid_arguments,
-            temper.approach,
-            frame_discount(hit.behaviour, fps),
-            hit.behaviour.tolerance,
+            tracks.centre,
+            np.stack([x, z, np.sin(yaw), np.cos(yaw)], axis=1),
             tracks.tip,
             tracks.tip_weight,
             tracks.tip_when,
             tracks.tip_start,
-            hit.value,
-            hit.grid_arguments,
-            temper.strike,
-            tracks.root,
-            temper.facing,
-            worth,
-            gap,
         )
-        stretch = table.stretch[actions]
-        apart = gap >= temper.personal_space
-        # Where every action would come too near, those that stay farthest off.
-        allowed = apart if apart.any() else gap >= gap.max() - 0.02
-        recent = np.isin(stretch, np.fromiter(self._recent, np.int64, len(self._recent)))
-        # What counts is how much better an action is than the usual one: far from the target all
-        # are worth nearly the same, and still one of them leads there.
-        gain = worth - np.median(worth[allowed])
-        gain -= np.where(recent, temper.boredom * np.abs(gain), 0.0)
-        gain[~allowed] = -np.inf
-        order = np.argsort(-gain, kind="stable")[: temper.few]
-        best = order[gain[order] >= (1.0 - temper.slack) * gain[order[0]]]
-        if len(best) == 0:  # all are worth less than the median after boredom
-            best = order[:1]
-        pick = int(best[self.rng.integers(len(best))])
-        self._recent.append(int(stretch[pick]))
-        while len(self._recent) > temper.memory:
-            self._recent.popleft()
-        return Choice(int(stretch[pick]), float(worth[pick]), len(worth), int(apart.sum()))
+
+    def worth(self, policy: Policy) -> Worth:
+        """A policy as the kernels take it."""
+        behaviour = policy.behaviour
+        scale = behaviour.sigma if behaviour.name == "approach" else behaviour.tolerance
+        discount = frame_discount(behaviour, self.library.clips.fps)
+        low, step, size, wraps, inside_only = policy.grid_arguments
+        return Worth(policy.value, low, step, size, wraps, inside_only, discount, scale)
+
+    @cached_property
+    def worths(self) -> tuple[Worth, Worth]:
+        return self.worth(self.approach), self.worth(self.strike)
 
 
-def _within(target: np.ndarray, radius: float) -> np.ndarray:
-    """A target's places [H, 3], moved so that the first lies within ``radius`` of the avatar.
+class Fighters:
+    """K minds: each sees where its target will be and picks its next action.
 
-    A target out of the grid is approached as if it stood on its rim: each action brings it nearer.
-    (Were the place after the action clamped instead, no way of getting there would be better than
-    another.)
+    ``tempers`` may be changed between decisions; the next one uses them.
     """
-    away = float(np.hypot(target[0, 0], target[0, 2]))
-    if away <= radius:
-        return target
-    return target - (1.0 - radius / away) * np.array([target[0, 0], 0.0, target[0, 2]])
+
+    def __init__(self, skill: Skill, tempers: Sequence[Temper], seed: int) -> None:
+        self.skill = skill
+        self.tempers = list(tempers)
+        count = len(self.tempers)
+        memory = max((t.memory for t in self.tempers), default=0)
+        self.minds = kernels.Minds(
+            np.zeros((count, 7)),
+            np.full((count, memory), -1, dtype=np.int64),
+            np.zeros(count, dtype=np.int64),
+            np.random.SeedSequence(seed).generate_state(count, np.uint64),
+        )
+        self.choices = kernels.Choices(
+            np.zeros(count, dtype=np.int64),
+            np.zeros(count),
+            np.zeros(count, dtype=np.int64),
+            np.zeros(count, dtype=np.int64),
+        )
+
+    def _note(self, who: np.ndarray) -> None:
+        """The tempers of those who are about to choose, as they are now."""
+        for k in who.tolist():
+            t = self.tempers[k]
+            self.minds.temper[k] = (
+                t.approach,
+                t.strike,
+                t.facing,
+                t.few,
+                t.slack,
+                t.boredom,
+                t.personal_space,
+            )
+
+    def decide(
+        self,
+        who: np.ndarray,
+        states: np.ndarray,
+        place: np.ndarray,
+        grid: kernels.Hash,
+        actors: kernels.Actors,
+        horizon: int,
+    ) -> kernels.Choices:
+        """Characters who [W], each in its state [W] of the action table, pick their next actions.
+
+        place [K, 3]: where all stand, hashed in ``grid``; horizon: frames that the others' motion
+        is foreseen. What is returned holds the last choice of everyone [K].
+        """
+        self._note(who)
+        run = kernels.decide_many if len(who) >= MANY else kernels.decide
+        moves, worths = self.skill.moves, self.skill.worths
+        run(who, states, place, grid, actors, self.minds, moves, *worths, horizon, self.choices)
+        return self.choices
+
+    def pick(self, k: int, state: int, target: np.ndarray, others: np.ndarray) -> int:
+        """Character k picks an action of a state: its stretch.
+
+        target [H, 3]: the target's expected places at frames 1.. from now, others [O, H, 2] those
+        of bodies to keep apart from; in its facing frame, the last row from then on.
+        """
+        self._note(np.array([k]))
+        moves, worths = self.skill.moves, self.skill.worths
+        kernels.pick(k, state, target, others, self.minds, moves, *worths, self.choices)
+        return int(self.choices.stretch[k])

@@ -1,14 +1,10 @@
-"""Do fists meet bodies? Swept tests between two frames, so that no fist skips through.
-
-Shapes: K characters, B body parts (tapered capsules), 4 limbs.
-"""
+"""Do fists meet bodies? Swept tests between two frames, so that no fist skips through."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from kumite.kernels.jit import kernel
-from kumite.kernels.pose import add_rotated
 
 NO_HIT = -1
 NO_BLOW = -1
@@ -69,71 +65,3 @@ def swept_contact(p0, p1, a0, a1, b0, b1, radius_a, radius_b, radius):
             return t
         apart = t
     return -1.0
-
-
-@kernel
-def part_ends(position, world_wxyz, joint, start, end, a, b):
-    """Ends of every body part of every character in the scene: a, b [K, B, 3]."""
-    for k in range(position.shape[0]):
-        for p in range(joint.shape[0]):
-            j = joint[p]
-            add_rotated(world_wxyz[k, j], start[p], position[k, j], a[k, p])
-            add_rotated(world_wxyz[k, j], end[p], position[k, j], b[k, p])
-
-
-@kernel
-def limb_tips(position, world_wxyz, joint, offset, tip):
-    """Tips of the four limbs of every character: tip [K, 4, 3]."""
-    for k in range(position.shape[0]):
-        for s in range(joint.shape[0]):
-            add_rotated(world_wxyz[k, joint[s]], offset[s], position[k, joint[s]], tip[k, s])
-
-
-@kernel
-def find_hits(
-    opponent,
-    blow,
-    landed,
-    tip_before,
-    tip,
-    a_before,
-    a,
-    b_before,
-    b,
-    radius_a,
-    radius_b,
-    target_part,
-    limb_radius,
-    hit_part,
-    hit_time,
-):
-    """Which blows touch the opponent's target parts during this frame.
-
-    opponent [K] or NOBODY; blow [K, 4] the blow each limb is throwing, or NO_BLOW; landed [K, 4]
-    the last blow of the limb that landed (a blow lands once); target_part [B] bool. Fills hit_part
-    [K, 4] (or NO_HIT) and hit_time [K, 4] (0..1 within the frame).
-    """
-    for k in range(opponent.shape[0]):
-        v = opponent[k]
-        for s in range(4):
-            hit_part[k, s] = NO_HIT
-            hit_time[k, s] = 2.0
-            if v == NOBODY or blow[k, s] == NO_BLOW or blow[k, s] == landed[k, s]:
-                continue
-            for p in range(target_part.shape[0]):
-                if not target_part[p]:
-                    continue
-                t = swept_contact(
-                    tip_before[k, s],
-                    tip[k, s],
-                    a_before[v, p],
-                    a[v, p],
-                    b_before[v, p],
-                    b[v, p],
-                    radius_a[p],
-                    radius_b[p],
-                    limb_radius[s],
-                )
-                if t >= 0.0 and t < hit_time[k, s]:
-                    hit_time[k, s] = t
-                    hit_part[k, s] = p

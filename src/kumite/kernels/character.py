@@ -20,6 +20,7 @@ from kumite.kernels.jit import kernel, parallel_kernel
 from kumite.kernels.pose import add_rotated, forward_kinematics_frame, quaternion_product
 
 TINY = 1e-12
+LN2 = 0.6931471805599453
 MANY = 256  # characters (2 ms of work) from which threads pay, on cores that others use too
 
 
@@ -41,6 +42,7 @@ class Build(NamedTuple):
     parents: np.ndarray  # [J]
     offsets: np.ndarray  # [J, 3]
     legs: np.ndarray  # [2, 3] thigh, shin and foot joints
+    below: np.ndarray  # [2, N] what hangs from each thigh, itself first, then -1
 
 
 class Springs(NamedTuple):
@@ -147,8 +149,13 @@ def align(anchor, facing_from, facing_to, out):
 @kernel
 def spring(position, velocity, half_life, dt):
     """One step of a critically damped spring to zero, in place: exact for any dt."""
-    y = 2.0 * 0.6931471805599453 / half_life
-    e = np.exp(-y * dt)
+    y = 2.0 * LN2 / half_life
+    decay(position, velocity, y, np.exp(-y * dt), dt)
+
+
+@kernel
+def decay(position, velocity, y, e, dt):
+    """:func:`spring` with its rate y [1/s] and what that leaves after dt, e, worked out before."""
     for c in range(position.shape[0]):
         j = velocity[c] + position[c] * y
         position[c] = e * (position[c] + j * dt)
@@ -246,8 +253,22 @@ def arc(a, b, out):
 
 
 @kernel
-def reach(upper, middle, end, goal, parents, offsets, root, wxyz, position, world_wxyz):
+def pose_below(below, parents, offsets, wxyz, position, world_wxyz):
+    """Positions and world rotations of the joints of a limb, whose parents' are up to date."""
+    for i in range(below.shape[0]):
+        j = below[i]
+        if j < 0:
+            break
+        p = parents[j]
+        add_rotated(world_wxyz[p], offsets[j], position[p], position[j])
+        quaternion_product(world_wxyz[p], wxyz[j], world_wxyz[j])
+
+
+@kernel
+def reach(upper, middle, end, below, goal, parents, offsets, wxyz, position, world_wxyz):
     """Two-bone inverse kinematics: bring joint ``end`` to ``goal`` [3], keep its world rotation.
+
+    below: the joints that hang from ``upper``, itself first, then -1.
 
     The limb bends in the plane it bends in; out of reach it stretches towards the goal to 99.9 %.
     Leaves local rotations, positions and world rotations up to date.
@@ -274,14 +295,14 @@ def reach(upper, middle, end, goal, parents, offsets, root, wxyz, position, worl
         length = np.sqrt(np.sum(axis**2))
     exponential(axis * (-bend / length), delta)
     turn_joint(middle, parents, delta, wxyz, world_wxyz)
-    forward_kinematics_frame(parents, offsets, root, wxyz, position, world_wxyz)
+    pose_below(below, parents, offsets, wxyz, position, world_wxyz)
     arc(position[end] - position[upper], goal - position[upper], delta)
     turn_joint(upper, parents, delta, wxyz, world_wxyz)
-    forward_kinematics_frame(parents, offsets, root, wxyz, position, world_wxyz)
+    pose_below(below, parents, offsets, wxyz, position, world_wxyz)
     inverse = np.empty(4)
     conjugate(world_wxyz[parents[end]], inverse)
     quaternion_product(inverse, kept, wxyz[end])
-    forward_kinematics_frame(parents, offsets, root, wxyz, position, world_wxyz)
+    pose_below(below, parents, offsets, wxyz, position, world_wxyz)
 
 
 @kernel
@@ -318,17 +339,24 @@ def show_one(k, frame, anchor, dt, springs, capture, build, offsets, poses):
         dt,
     )
     turn, held, pushed, base = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
+    quick, slow = 2.0 * LN2 / springs.joint, 2.0 * LN2 / springs.reaction
+    left_quick, left_slow = np.exp(-quick * dt), np.exp(-slow * dt)
     for j in range(wxyz.shape[0]):
-        spring(offsets.joint[k, j], offsets.joint_velocity[k, j], springs.joint, dt)
-        spring(offsets.reaction[k, j], offsets.reaction_velocity[k, j], springs.reaction, dt)
+        decay(offsets.joint[k, j], offsets.joint_velocity[k, j], quick, left_quick, dt)
+        struck = np.any(offsets.reaction_velocity[k, j] != 0.0)
+        if struck:
+            decay(offsets.reaction[k, j], offsets.reaction_velocity[k, j], slow, left_slow, dt)
         if j == 0:
             anchored_root(anchor[k], capture.root[f], capture.wxyz[f, 0], root_position, base)
         else:
             base[:] = capture.wxyz[f, j]
         exponential(offsets.joint[k, j], held)
-        exponential(offsets.reaction[k, j], pushed)
-        quaternion_product(held, pushed, turn)
-        quaternion_product(base, turn, wxyz[j])
+        if struck:
+            exponential(offsets.reaction[k, j], pushed)
+            quaternion_product(held, pushed, turn)
+            quaternion_product(base, turn, wxyz[j])
+        else:
+            quaternion_product(base, held, wxyz[j])
     for c in range(3):
         root_position[c] += offsets.root[k, c]
     parents, bones = build.parents, build.offsets
@@ -340,7 +368,7 @@ def show_one(k, frame, anchor, dt, springs, capture, build, offsets, poses):
         goal[1] = capture.ankle[f, s, 1] + offsets.foot[k, s, 1]
         goal[2] = z + offsets.foot[k, s, 2]
         thigh, shin, foot = build.legs[s, 0], build.legs[s, 1], build.legs[s, 2]
-        reach(thigh, shin, foot, goal, parents, bones, root_position, wxyz, position, world_wxyz)
+        reach(thigh, shin, foot, build.below[s], goal, parents, bones, wxyz, position, world_wxyz)
 
 
 @kernel
@@ -355,3 +383,16 @@ def show_many(frame, anchor, dt, springs, capture, build, offsets, poses):
     """:func:`show` on all cores: worth its start-up from ``MANY`` characters on."""
     for k in prange(frame.shape[0]):
         show_one(k, frame, anchor, dt, springs, capture, build, offsets, poses)
+
+
+@kernel
+def begin(who, stretch, first, last, frame, stop, anchor, capture, offsets, jump):
+    """Characters who [W] take the stretches [K] they chose; jump [K]: whether it was a join."""
+    for w in range(who.shape[0]):
+        k = who[w]
+        source, target = frame[k], first[stretch[k]] - 1
+        stop[k] = last[stretch[k]]
+        frame[k] = target
+        jump[k] = target != source
+        if jump[k]:
+            join(k, source, target, anchor, capture, offsets)

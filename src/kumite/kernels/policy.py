@@ -11,6 +11,8 @@ Shapes: N states, A actions, L stretches, M grid points, W interpolation corners
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import prange
 
@@ -183,118 +185,112 @@ def best_actions(action_start, stretch, q, value, change):
         change[s] = largest
 
 
+class Moves(NamedTuple):
+    """What the stretches of an action table do, seen from where they begin."""
+
+    action_start: np.ndarray  # [N + 1]
+    stretch: np.ndarray  # [A]
+    successor: np.ndarray  # [L]
+    displacement: np.ndarray  # [L, 3]
+    duration: np.ndarray  # [L] frames
+    start: np.ndarray  # [L + 1] first row of each stretch in centre and root
+    centre: np.ndarray  # [T, 2] m, where blows land, on the ground
+    root: np.ndarray  # [T, 4] m and sine, cosine: (x, z) and yaw of the facing frame
+    tip: np.ndarray  # [P, 3] m, effective hitting points
+    tip_weight: np.ndarray  # [P]
+    tip_when: np.ndarray  # [P] frames, from 1
+    tip_start: np.ndarray  # [L + 1]
+
+
+class Worth(NamedTuple):
+    """A solved behaviour, and how its reward is scaled."""
+
+    value: np.ndarray  # [N, M] float32
+    low: np.ndarray  # the grid: see corners()
+    step: np.ndarray
+    size: np.ndarray
+    wraps: bool
+    inside_only: bool
+    discount: float  # per frame
+    scale: float  # m, σ of approaching or the tolerance of striking
+
+
 @kernel
-def look_ahead(
-    state,
-    goal,
-    target,
-    other,
-    action_start,
-    stretch,
-    successor,
-    displacement,
-    duration,
-    discount_approach,
-    sigma,
-    track,
-    track_start,
-    approach_value,
-    approach_grid,
-    weight_approach,
-    discount_strike,
-    tolerance,
-    tip,
-    tip_weight,
-    tip_when,
-    tip_start,
-    strike_value,
-    strike_grid,
-    weight_strike,
-    root,
-    facing,
-    worth,
-    gap,
-):
+def worth_later(worth, state, x, y, z, index, weight):
+    """The interpolated value of a state with the target at a point of its facing frame."""
+    return interpolate(
+        worth.value[state],
+        x,
+        y,
+        z,
+        worth.low,
+        worth.step,
+        worth.size,
+        worth.wraps,
+        worth.inside_only,
+        index,
+        weight,
+    )
+
+
+@kernel
+def look_ahead(state, goal, target, others, moves, near, hit, approach, strike, facing, worth, gap):
     """One step of Eq. 4 at run time, exact in the continuous target, for every action of a state.
 
     target [H, 3]: where the target is expected at frames 1.. after the decision, seen from the
     avatar's facing frame; the last row holds from then on. goal [H, 3]: the same for approaching,
-    brought within the reach of its grid. other [H, 2]: the same for the body that must not be run
-    into. track, tip, root: what the stretches do (root [., 3] is (x, z, yaw) of the facing frame
-    and shares track_start). A grid is (low, step, size, wraps, inside_only). Fills worth [n] with
-    the weighted values, cut down by exp(-facing) for each unit by which the target is out of a cone
-    ahead (in cosine, mean over the action), and gap [n] with the smallest distance kept to the
-    other body.
+    brought within the reach of its grid. others [O, H, 2]: the same for bodies that must not be run
+    into. approach, strike, facing: weights. Fills worth [n] with the weighted values, cut down by
+    exp(-facing) for each unit by which the target is out of a cone ahead (in cosine, mean over the
+    action), and gap [n] with the smallest distance kept to the other bodies.
     """
     index = np.zeros(8, dtype=np.int64)
     weight = np.zeros(8)
     horizon = target.shape[0] - 1
-    low_a, step_a, size_a, wraps_a, inside_a = approach_grid
-    low_s, step_s, size_s, wraps_s, inside_s = strike_grid
-    for n, a in enumerate(range(action_start[state], action_start[state + 1])):
-        k = stretch[a]
-        first, last = track_start[k], track_start[k + 1]
-        end = min(duration[k], horizon + 1) - 1
+    for n, a in enumerate(range(moves.action_start[state], moves.action_start[state + 1])):
+        k = moves.stretch[a]
+        first, last = moves.start[k], moves.start[k + 1]
+        end = min(moves.duration[k], horizon + 1) - 1
         worth[n] = 0.0
-        if weight_approach != 0.0:
-            x, z = carry(displacement[k], goal[end, 0], goal[end, 2])
-            best, factor = 0.0, 1.0
+        if approach != 0.0:
+            best, factor, nearest = 0.0, 1.0, np.inf
             for t in range(last - first):
-                factor *= discount_approach
+                factor *= near.discount
                 if factor <= best:
                     break
                 h = min(t, horizon)
-                d = np.hypot(track[first + t, 0] - goal[h, 0], track[first + t, 1] - goal[h, 2])
-                best = max(best, factor * np.exp(-d / sigma))
-            later = interpolate(
-                approach_value[successor[k]],
-                x,
-                0.0,
-                z,
-                low_a,
-                step_a,
-                size_a,
-                wraps_a,
-                inside_a,
-                index,
-                weight,
-            )
-            worth[n] += weight_approach * (best + discount_approach ** duration[k] * later)
-        if weight_strike != 0.0:
-            x, z = carry(displacement[k], target[end, 0], target[end, 2])
-            y = target[end, 1]
+                dx, dz = (
+                    moves.centre[first + t, 0] - goal[h, 0],
+                    moves.centre[first + t, 1] - goal[h, 2],
+                )
+                d2 = dx * dx + dz * dz
+                if d2 < nearest:  # later and farther off is never better
+                    nearest = d2
+                    best = max(best, factor * np.exp(-np.sqrt(d2) / near.scale))
+            x, z = carry(moves.displacement[k], goal[end, 0], goal[end, 2])
+            later = worth_later(near, moves.successor[k], x, 0.0, z, index, weight)
+            worth[n] += approach * (best + near.discount ** moves.duration[k] * later)
+        if strike != 0.0:
             best = 0.0
-            for p in range(tip_start[k], tip_start[k + 1]):
-                h = min(tip_when[p] - 1, horizon)
+            for p in range(moves.tip_start[k], moves.tip_start[k + 1]):
+                h = min(moves.tip_when[p] - 1, horizon)
                 d2 = 0.0
                 for c in range(3):
-                    d2 += (tip[p, c] - target[h, c]) ** 2
-                if d2 <= tolerance * tolerance:
-                    best = max(best, discount_strike ** tip_when[p] * tip_weight[p])
-            later = interpolate(
-                strike_value[successor[k]],
-                x,
-                y,
-                z,
-                low_s,
-                step_s,
-                size_s,
-                wraps_s,
-                inside_s,
-                index,
-                weight,
-            )
-            worth[n] += weight_strike * (best + discount_strike ** duration[k] * later)
-        nearest = np.inf
-        astray = 0.0
+                    d2 += (moves.tip[p, c] - target[h, c]) ** 2
+                if d2 <= hit.scale * hit.scale:
+                    best = max(best, hit.discount ** moves.tip_when[p] * moves.tip_weight[p])
+            x, z = carry(moves.displacement[k], target[end, 0], target[end, 2])
+            later = worth_later(hit, moves.successor[k], x, target[end, 1], z, index, weight)
+            worth[n] += strike * (best + hit.discount ** moves.duration[k] * later)
+        near2, astray = np.inf, 0.0
         for t in range(last - first):
             h = min(t, horizon)
-            x = target[h, 0] - root[first + t, 0]
-            z = target[h, 2] - root[first + t, 1]
-            yaw = root[first + t, 2]
-            cosine = (x * np.sin(yaw) + z * np.cos(yaw)) / (np.hypot(x, z) + 1e-9)
-            astray += max(0.0, FACING_CONE - cosine)
-            d = np.hypot(root[first + t, 0] - other[h, 0], root[first + t, 1] - other[h, 1])
-            nearest = min(nearest, d)
+            rx, rz = moves.root[first + t, 0], moves.root[first + t, 1]
+            x, z = target[h, 0] - rx, target[h, 2] - rz
+            ahead = x * moves.root[first + t, 2] + z * moves.root[first + t, 3]
+            astray += max(0.0, FACING_CONE - ahead / (np.sqrt(x * x + z * z) + 1e-9))
+            for o in range(others.shape[0]):
+                dx, dz = rx - others[o, h, 0], rz - others[o, h, 1]
+                near2 = min(near2, dx * dx + dz * dz)
         worth[n] *= np.exp(-facing * astray / (last - first))
-        gap[n] = nearest
+        gap[n] = np.sqrt(near2)

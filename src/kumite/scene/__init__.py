@@ -4,7 +4,7 @@ from kumite.scene.live import LiveScene
 from kumite.scene.metrics import CharacterMetrics, Metrics, measure
 from kumite.scene.recording import Event, Recording, load_recording, save_recording
 from kumite.scene.run import record
-from kumite.scene.settings import SceneSettings, builtin_scenes, load_scene
+from kumite.scene.settings import SceneSettings, builtin_scenes, load_scene, with_count
 from kumite.scene.stage import Playback, SceneObject, Stage
 
 __all__ = [
@@ -23,4 +23,5 @@ __all__ = [
     "measure",
     "record",
     "save_recording",
+    "with_count",
 ]

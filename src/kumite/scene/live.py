@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from kumite.body import lay_body
 from kumite.clip import LIMBS
-from kumite.control import Fighter, Skill, Temper, approach, stretch_tracks, strike, trained
+from kumite.control import Fighters, Skill, Temper, approach, stretch_tracks, strike, trained
 from kumite.errors import KumiteError
 from kumite.graph import Library
-from kumite.kernels import blow as kernels
-from kumite.rotation import planar_apply, planar_inverse, rotate
+from kumite.kernels import crowd as kernels
+from kumite.kernels.blow import NO_BLOW, NO_HIT, NOBODY, swept_contact
+from kumite.kernels.character import MANY
+from kumite.rotation import rotate
+from kumite.scene.memory import refuse_too_many
+from kumite.scene.pairs import pair_up
 from kumite.scene.recording import Event
-from kumite.scene.settings import SceneSettings
+from kumite.scene.settings import NEAREST, SceneSettings
 from kumite.scene.stage import SceneObject
 from kumite.synthesis import Cast
 
@@ -30,21 +32,7 @@ RECOIL = 0.018  # m that a struck segment gives way per m/s of the blow
 SWING = 0.35  # m/s that a struck target gains per m/s of the blow
 SWING_RATE = 7.0  # rad/s of the target's pendulum
 SWING_DAMPING = 0.25  # of critical
-
-
-@dataclass
-class Blows:
-    """Where blows land on a body, as the kernels take it. B parts, four limbs."""
-
-    joint: np.ndarray
-    start: np.ndarray
-    end: np.ndarray
-    radius_start: np.ndarray
-    radius_end: np.ndarray
-    target: np.ndarray  # [B] bool
-    tip_joint: np.ndarray  # [4]
-    tip_offset: np.ndarray  # [4, 3], centre of the fist's sphere: its front is the limb's tip
-    tip_radius: np.ndarray  # [4]
+REPAIRING = 1.0  # s after which those who aim at the nearest look round again
 
 
 class LiveScene:
@@ -67,7 +55,11 @@ class LiveScene:
         self.title = settings.title
         self.fps = library.clips.fps
         self.skeleton = library.clips.skeleton
-        self.names = tuple(c.name for c in settings.character)
+        refuse_too_many(
+            len(settings.character) + (settings.crowd.count if settings.crowd else 0),
+            len(self.skeleton),
+        )
+        self.names = tuple(c.name for c in settings.characters)
         if len(library.strikes) == 0:
             raise KumiteError("the library holds no effective hits: nobody in it can strike")
         tracks = stretch_tracks(library)
@@ -83,26 +75,21 @@ class LiveScene:
             tracks,
         )
         self.body = lay_body(self.skeleton)
-        self._blows = self._lay_blows()
-        self._aim = [self._aims_at(c.aims_at) for c in settings.character]
+        self._shapes = self._lay_shapes()
         position, world = library.clips.world
         head = self.body.part(AIM)
         middle = 0.5 * (self.body.start[head] + self.body.end[head])
         joint = int(self.body.joint[head])
-        self._head_joint, self._head_offset = joint, middle
         self._head = position[:, joint] + rotate(world[:, joint], middle)  # [F, 3] library world
+        self._horizon = max(1, round(ANTICIPATION * self.fps))
         self.tempers = [
             Temper(c.approach, c.strike, c.facing, c.few, personal_space=c.personal_space)
-            for c in settings.character
+            for c in settings.characters
         ]
         self.reset(seed)
 
-    def _aims_at(self, name: str) -> tuple[str, int]:
-        if name in self.names:
-            return "character", self.names.index(name)
-        return "object", [o.name for o in self.settings.object].index(name)
-
-    def _lay_blows(self) -> Blows:
+    def _lay_shapes(self) -> kernels.Shapes:
+        """Where blows land on a body, and with what limbs strike."""
         body, skeleton = self.body, self.skeleton
         joints, offsets, radii = [], [], []
         for limb in LIMBS:
@@ -110,9 +97,10 @@ class LiveScene:
             radius = float(body.radius_end[body.part(limb)])
             length = float(np.linalg.norm(offset))
             joints.append(joint)
+            # The sphere's front is the limb's tip.
             offsets.append(offset * (1.0 - min(radius / max(length, 1e-6), 1.0)))
             radii.append(radius)
-        return Blows(
+        return kernels.Shapes(
             body.joint.astype(np.int64),
             body.start,
             body.end,
@@ -130,32 +118,73 @@ class LiveScene:
         self.frame = 0
         self.events: list[Event] = []
         count = len(self.names)
-        streams = np.random.SeedSequence(self.seed).spawn(count + 1)
-        rng = np.random.default_rng(streams[0])
-        self.fighters = [
-            Fighter(self.skill, temper, np.random.default_rng(s))
-            for temper, s in zip(self.tempers, streams[1:])
-        ]
+        rng = np.random.default_rng(self.seed)
+        self.fighters = Fighters(self.skill, self.tempers, self.seed)
         self.objects = [
             SceneObject(o.name, np.array(o.position), o.radius, o.draggable)
             for o in self.settings.object
         ]
         self._home = [thing.position.copy() for thing in self.objects]
         self._swing = [np.zeros(3) for _ in self.objects]
-        self.cast = Cast(self.library, count)
+        self.cast = cast = Cast(self.library, count)
         # Everyone starts in a state with many ways out: the usual guard, not the end of a blow.
         ways = np.diff(self.library.table.action_start)
         common = np.flatnonzero(ways >= np.quantile(ways, 0.75))
-        for k, c in enumerate(self.settings.character):
+        for k, c in enumerate(self.settings.characters):
             facing = np.array([*c.position, np.radians(c.yaw_deg)])
-            self.cast.place(k, int(rng.choice(common)), facing)
-        self.cast.show(0.0)
-        parts = len(self.body)
-        self._tip = np.zeros((count, len(LIMBS), 3))
-        self._a, self._b = np.zeros((count, parts, 3)), np.zeros((count, parts, 3))
-        self._landed = np.full((count, len(LIMBS)), kernels.NO_BLOW, dtype=np.int32)
-        self._thrown = self._landed.copy()
-        self._measure()
+            cast.place(k, int(rng.choice(common)), facing)
+        cast.show(0.0)
+        clips = self.library.clips
+        self._things = np.array([o.position for o in self.objects]).reshape(-1, 3)
+        self._actors = kernels.Actors(
+            cast.frame,
+            cast.stop,
+            cast.anchor,
+            np.full(count, NOBODY, dtype=np.int64),
+            np.full(count, NOBODY, dtype=np.int64),
+            self._things,
+            self._head,
+            clips.root_position,
+            clips.facing,
+        )
+        self._aim()
+        buckets = 1 << max(3, int(2 * count - 1).bit_length())
+        self._hash = kernels.Hash(
+            np.zeros(buckets + 1, dtype=np.int32),
+            np.zeros(count, dtype=np.int32),
+            np.zeros((count, 2), dtype=np.int32),
+        )
+        parts, limbs = len(self.body), len(LIMBS)
+        self._push = np.zeros((count, 2))
+        self._blows = kernels.Blows(
+            np.zeros((2, count, limbs, 3)),
+            np.zeros((2, count, parts, 3)),
+            np.zeros((2, count, parts, 3)),
+            np.full((count, limbs), NO_BLOW, dtype=np.int32),
+            np.full((count, limbs), NO_BLOW, dtype=np.int32),
+            np.zeros((count, limbs), dtype=bool),
+            np.full((count, limbs), NO_HIT, dtype=np.int64),
+            np.zeros((count, limbs)),
+        )
+        self._find_blows()
+
+    def _aim(self) -> None:
+        """Who aims at whom: as the scene says, or at the nearest who is free (or else at all)."""
+        opponent, thing = self._actors.opponent, self._actors.thing
+        number = {name: k for k, name in enumerate(self.names)}
+        objects = [o.name for o in self.settings.object]
+        free = []
+        for k, c in enumerate(self.settings.characters):
+            if c.aims_at == NEAREST:
+                free.append(k)
+            elif c.aims_at in number:
+                opponent[k] = number[c.aims_at]
+            else:
+                thing[k] = objects.index(c.aims_at)
+        if free:
+            who = np.array(free)
+            ground = self.cast.root_position[who][:, [0, 2]]
+            opponent[who] = who[pair_up(ground, np.searchsorted(who, opponent[who]))]
 
     @property
     def root_position(self) -> np.ndarray:
@@ -175,170 +204,131 @@ class LiveScene:
 
     def step(self) -> bool:
         """One frame: who has ended an action chooses, all move, blows are tested."""
-        for k in self.cast.waiting:
-            self._decide(int(k))
+        if self.frame % round(REPAIRING * self.fps) == 0 and self.frame:
+            self._aim()
+        who = self.cast.waiting
+        if len(who):
+            self._decide(who)
         self.cast.advance()
         self.frame += 1
         self._keep_apart()
-        self._test_blows()
-        self._swing_objects()
+        self._find_blows()
+        if self.objects:
+            self._test_objects()
+            self._swing_objects()
         return True
 
     # Deciding ------------------------------------------------------------------------------------
 
-    def _decide(self, k: int) -> None:
-        state = int(np.searchsorted(self.library.table.state_frame, self.cast.frame[k]))
-        here = planar_inverse(self.cast.facing[k])
-        kind, index = self._aim[k]
-        if kind == "character":
-            frames = self._foreseen(index)
-            target = self._place_of(index, self._head[frames])
-            other = self._place_of(index, self.library.clips.root_position[frames])
-        else:
-            target = other = self.objects[index].position[None]
-        target, other = planar_apply(here, target), planar_apply(here, other)[:, [0, 2]]
-        if kind == "object":
-            other = np.full((1, 2), 1e6)  # a target may be stood under
-        choice = self.fighters[k].choose(state, np.ascontiguousarray(target), other.copy())
-        jump = self.cast.begin(k, choice.stretch)
-        self._event(
-            "decision",
-            k,
-            state=state,
-            stretch=choice.stretch,
-            worth=round(choice.worth, 6),
-            considered=choice.considered,
-            apart=choice.apart,
-            jump=bool(jump),
-        )
-
-    def _foreseen(self, k: int) -> np.ndarray:
-        """Library frames [H] that character k will show next, as far as others can foresee."""
-        ahead = max(1, round(ANTICIPATION * self.fps))
-        return np.minimum(self.cast.frame[k] + np.arange(1, ahead + 1), self.cast.stop[k])
-
-    def _place_of(self, k: int, point: np.ndarray) -> np.ndarray:
-        return planar_apply(self.cast.anchor[k], point)
+    def _decide(self, who: np.ndarray) -> None:
+        for o, thing in enumerate(self.objects):
+            self._things[o] = thing.position
+        states = np.searchsorted(self.library.table.state_frame, self.cast.frame[who])
+        place = self.cast.root_position
+        kernels.fill_hash(place, self._hash)
+        choices = self.fighters.decide(who, states, place, self._hash, self._actors, self._horizon)
+        jump = self.cast.begin(who, choices.stretch)
+        for k, state in zip(who.tolist(), states.tolist()):
+            self._event(
+                "decision",
+                k,
+                state=state,
+                stretch=int(choices.stretch[k]),
+                worth=round(float(choices.worth[k]), 6),
+                considered=int(choices.considered[k]),
+                apart=int(choices.apart[k]),
+                jump=bool(jump[k]),
+            )
 
     # Bodies --------------------------------------------------------------------------------------
 
     def _keep_apart(self) -> None:
-        """Two bodies that come too near are carried apart, slowly; planted feet stay."""
-        ground = self.cast.root_position[:, [0, 2]]
-        near = KDTree(ground).query_pairs(CLOSEST, output_type="ndarray")
-        for i, j in near[np.lexsort(near.T)].tolist():
-            gap = ground[j] - ground[i]
-            distance = float(np.hypot(*gap))
-            away = gap / distance if distance > 1e-6 else np.array([1.0, 0.0])
-            push = 0.5 * min(CLOSEST - distance, PUSH_SPEED / self.fps) * away
-            self.cast.shift(i, *(-push))
-            self.cast.shift(j, *push)
-
-    def _measure(self) -> None:
-        """Fists and bodies of the pose just made, kept beside those of the one before."""
-        cast, blows = self.cast, self._blows
-        self._tip_before, self._a_before, self._b_before = self._tip, self._a, self._b
-        self._tip, self._a, self._b = (np.empty_like(x) for x in (self._tip, self._a, self._b))
-        kernels.limb_tips(
-            cast.position, cast.world_wxyz, blows.tip_joint, blows.tip_offset, self._tip
-        )
-        kernels.part_ends(
-            cast.position, cast.world_wxyz, blows.joint, blows.start, blows.end, self._a, self._b
+        """Bodies that come too near are carried apart, slowly; planted feet stay."""
+        place = self.cast.root_position
+        kernels.fill_hash(place, self._hash)
+        kernels.keep_apart(
+            place,
+            CLOSEST,
+            PUSH_SPEED / self.fps,
+            self._hash,
+            self._push,
+            self.cast.anchor,
+            self.cast.foot_offset,
         )
 
-    def _test_blows(self) -> None:
-        self._measure()
-        blow = self.cast.blow_of_frame[self.cast.frame]
-        for k, s in zip(*np.nonzero((blow != kernels.NO_BLOW) & (blow != self._thrown))):
-            self._event("strike", int(k), limb=LIMBS[s], blow=int(blow[k, s]))
-        self._thrown = np.where(blow != kernels.NO_BLOW, blow, self._thrown)
-        # A limb that has finished a blow may throw the same captured one again.
-        self._thrown = np.where(blow == kernels.NO_BLOW, kernels.NO_BLOW, self._thrown)
-        self._landed = np.where(blow == kernels.NO_BLOW, kernels.NO_BLOW, self._landed)
-        self._test_bodies(blow)
-        self._test_objects(blow)
+    def _find_blows(self) -> None:
+        """Fists and bodies of the pose just made, blows begun, blows landed."""
+        cast = self.cast
+        run = kernels.test_blows_many if cast.count >= MANY else kernels.test_blows
+        happened = run(
+            cast.frame,
+            self._actors.opponent,
+            cast.blow_of_frame,
+            cast.position,
+            cast.world_wxyz,
+            self._shapes,
+            self._blows,
+        )
+        if not happened or self.frame == 0:
+            return
+        for k, s in np.argwhere(self._blows.begun).tolist():
+            self._event("strike", k, limb=LIMBS[s], blow=int(self._blows.thrown[k, s]))
+        for k, s in np.argwhere(self._blows.part != NO_HIT).tolist():
+            self._land(k, s)
 
-    def _test_bodies(self, blow: np.ndarray) -> None:
-        opponent = np.array([i if kind == "character" else kernels.NOBODY for kind, i in self._aim])
-        part = np.empty(blow.shape, dtype=np.int64)
-        when = np.empty(blow.shape)
+    def _land(self, k: int, s: int) -> None:
+        """Limb s of character k has hit its opponent: say so, and let the struck segment give."""
         blows = self._blows
-        kernels.find_hits(
-            opponent,
-            blow,
-            self._landed,
-            self._tip_before,
-            self._tip,
-            self._a_before,
-            self._a,
-            self._b_before,
-            self._b,
-            blows.radius_start,
-            blows.radius_end,
-            blows.target,
-            blows.tip_radius,
-            part,
-            when,
-        )
-        for k, s in zip(*np.nonzero(part != kernels.NO_HIT)):
-            victim, struck = int(opponent[k]), int(part[k, s])
-            t = float(when[k, s])
-            moved = self._tip[k, s] - self._tip_before[k, s]
-            place = self._tip_before[k, s] + t * moved
-            middle_before = 0.5 * (self._a_before[victim, struck] + self._b_before[victim, struck])
-            middle = 0.5 * (self._a[victim, struck] + self._b[victim, struck])
-            velocity = (moved - (middle - middle_before)) * self.fps
-            speed = float(np.linalg.norm(velocity))
-            self._landed[k, s] = blow[k, s]
-            self._event(
-                "hit",
-                int(k),
-                victim=self.names[victim],
-                limb=LIMBS[s],
-                part=self.body.parts[struck],
-                speed=round(speed, 4),
-                place=[round(float(x), 4) for x in place],
-                time=round((self.frame - 1 + t) / self.fps, 4),
-                blow=int(blow[k, s]),
-            )
-            self.cast.strike(victim, int(blows.joint[struck]), place, RECOIL * velocity)
+        victim, struck = int(self._actors.opponent[k]), int(blows.part[k, s])
+        t = float(blows.when[k, s])
+        before, now = blows.tip[:, k, s]
+        place = before + t * (now - before)
+        middle_before, middle = 0.5 * (blows.a[:, victim, struck] + blows.b[:, victim, struck])
+        velocity = ((now - before) - (middle - middle_before)) * self.fps
+        blows.landed[k, s] = blows.thrown[k, s]
+        self._hit(k, s, self.names[victim], self.body.parts[struck], velocity, place, t)
+        self.cast.strike(victim, int(self._shapes.joint[struck]), place, RECOIL * velocity)
 
-    def _test_objects(self, blow: np.ndarray) -> None:
-        for k, (kind, o) in enumerate(self._aim):
-            if kind != "object":
-                continue
+    def _hit(
+        self,
+        k: int,
+        s: int,
+        victim: str,
+        part: str,
+        velocity: np.ndarray,
+        place: np.ndarray,
+        t: float,
+    ) -> None:
+        self._event(
+            "hit",
+            k,
+            victim=victim,
+            limb=LIMBS[s],
+            part=part,
+            speed=round(float(np.linalg.norm(velocity)), 4),
+            place=[round(float(x), 4) for x in place],
+            time=round((self.frame - 1 + t) / self.fps, 4),
+            blow=int(self._blows.thrown[k, s]),
+        )
+
+    def _test_objects(self) -> None:
+        blows = self._blows
+        for k in np.flatnonzero(self._actors.thing != NOBODY).tolist():
+            o = int(self._actors.thing[k])
             thing = self.objects[o]
+            at, radius = thing.position, thing.radius
             for s in range(len(LIMBS)):
-                if blow[k, s] in (kernels.NO_BLOW, self._landed[k, s]):
+                if blows.thrown[k, s] in (NO_BLOW, blows.landed[k, s]):
                     continue
-                p0, p1 = self._tip_before[k, s], self._tip[k, s]
-                t = kernels.swept_contact(
-                    p0,
-                    p1,
-                    thing.position,
-                    thing.position,
-                    thing.position,
-                    thing.position,
-                    thing.radius,
-                    thing.radius,
-                    self._blows.tip_radius[s],
-                )
+                p0, p1 = blows.tip[:, k, s]
+                fist = self._shapes.tip_radius[s]
+                t = swept_contact(p0, p1, at, at, at, at, radius, radius, fist)
                 if t < 0:
                     continue
                 velocity = (p1 - p0) * self.fps
-                self._landed[k, s] = blow[k, s]
+                blows.landed[k, s] = blows.thrown[k, s]
                 self._swing[o] += SWING * velocity
-                self._event(
-                    "hit",
-                    k,
-                    victim=thing.name,
-                    limb=LIMBS[s],
-                    part=thing.name,
-                    speed=round(float(np.linalg.norm(velocity)), 4),
-                    place=[round(float(x), 4) for x in p0 + t * (p1 - p0)],
-                    time=round((self.frame - 1 + t) / self.fps, 4),
-                    blow=int(blow[k, s]),
-                )
+                self._hit(k, s, thing.name, thing.name, velocity, p0 + t * (p1 - p0), t)
 
     def _swing_objects(self) -> None:
         """Struck targets swing about where they belong and come back."""

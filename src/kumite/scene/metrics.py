@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from kumite.clip import SIDES, Skeleton, facing_frame, forward_kinematics
 from kumite.graph import Library
 from kumite.rotation import wrap_angle
-from kumite.scene.recording import Recording
+from kumite.scene.recording import Event, Recording
 
 FACING_WITHIN = np.radians(45.0)
 
@@ -62,6 +63,11 @@ def source_skate(library: Library) -> float:
     return foot_skate(clips.skeleton, position, on_ground, clips.fps)
 
 
+def _closest(ground: np.ndarray) -> list[float]:
+    """The smallest distance [m] between any two of ground [F, K, 2] in each frame."""
+    return [float(np.min(KDTree(frame).query(frame, k=2)[0][:, 1])) for frame in ground]
+
+
 def measure(recording: Recording) -> Metrics:
     """Score a recording."""
     skeleton, fps = recording.skeleton, recording.fps
@@ -76,11 +82,10 @@ def measure(recording: Recording) -> Metrics:
         positions.append(position)
         pelvis.append(position[:, skeleton.joint("pelvis")][:, [0, 2]])
         facing.append(facing_frame(skeleton, root, wxyz))
-    gaps = [
-        np.linalg.norm(pelvis[i] - pelvis[j], axis=1).min()
-        for i in range(count)
-        for j in range(i + 1, count)
-    ]
+    gaps = _closest(np.stack(pelvis, axis=1)) if count > 1 else []
+    events: dict[str, list[Event]] = {name: [] for name in recording.names}
+    for e in recording.events:
+        events[e.character].append(e)
     rows = []
     for k, name in enumerate(recording.names):
         skate = foot_skate(skeleton, positions[k], recording.contacts[:, k], fps)
@@ -100,7 +105,7 @@ def measure(recording: Recording) -> Metrics:
         speed = np.linalg.norm(np.diff(positions[k][:, 0], axis=0), axis=1) * fps
         inner = jump[(jump >= 2) & (jump < len(recording))]
         change = np.abs(speed[inner - 1] - speed[inner - 2])
-        mine = [e for e in recording.events if e.character == name]
+        mine = events[name]
         taken = [e.data.get("stretch") for e in mine if e.kind == "decision"]
         rows.append(
             CharacterMetrics(

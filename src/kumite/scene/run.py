@@ -8,8 +8,10 @@ import numpy as np
 
 from kumite.errors import KumiteError
 from kumite.scene.live import LiveScene
+from kumite.scene.memory import refuse_too_many
 from kumite.scene.metrics import source_skate
 from kumite.scene.recording import Event, Recording
+from kumite.scene.settings import NEAREST
 
 MOST_BYTES = 16e9  # of one recording
 
@@ -31,6 +33,7 @@ def record(
             f"seconds: {seconds:g}, expected at most {largest:.0f} (a recording is held in memory)"
         )
     frames = max(1, round(seconds * scene.fps))
+    refuse_too_many(count, joints, frames)
     root = np.empty((frames, count, 3), np.float32)
     wxyz = np.empty((frames, count, joints, 4), np.float32)
     contacts = np.empty((frames, count, 2), bool)
@@ -66,7 +69,9 @@ def record(
             "library": scene.library.digest,
             "source_skate_m_s": source_skate(scene.library),
             "object_radius": {thing.name: thing.radius for thing in scene.objects},
-            "aims_at": {c.name: c.aims_at for c in scene.settings.character},
+            "aims_at": {
+                c.name: c.aims_at for c in scene.settings.characters if c.aims_at != NEAREST
+            },
             "scene": scene.settings.model_dump(mode="json"),
         },
     )

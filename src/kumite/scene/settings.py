@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
+from functools import cached_property
 from importlib import resources
 from pathlib import Path
 from typing import Annotated
@@ -16,6 +17,8 @@ from kumite.errors import KumiteError
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Metres = Annotated[float, Field(ge=-1000, le=1000)]  # recordings keep single precision
 Name = Annotated[str, Field(min_length=1, max_length=60)]
+NEAREST = "nearest"  # aims at the nearest character that is free
+CROWD_SPACING = 1.5  # m between the two of a pair; pairs stand twice as far apart
 
 
 class _Settings(BaseModel):
@@ -26,7 +29,7 @@ class CharacterSettings(_Settings):
     name: Name
     position: tuple[Metres, Metres]  # m, x and z
     yaw_deg: Finite = 0.0  # 0 faces +Z
-    aims_at: Name  # a character (its head) or an object
+    aims_at: Name  # a character (its head), an object, or "nearest"
     approach: Annotated[Finite, Field(ge=0)] = 1.0  # weights of the behaviours
     strike: Annotated[Finite, Field(ge=0)] = 6.0
     facing: Annotated[Finite, Field(ge=0)] = 3.0
@@ -47,25 +50,84 @@ class ObjectSettings(_Settings):
     draggable: bool = True
 
 
+class CrowdSettings(_Settings):
+    """Characters that stand in pairs all over a square, each with the nearest who is free."""
+
+    count: Annotated[int, Field(ge=2, le=1_000_000)] = 30
+    spacing: Annotated[Finite, Field(ge=0.8, le=20)] = CROWD_SPACING  # m
+    approach: Annotated[Finite, Field(ge=0)] = 1.0
+    strike: Annotated[Finite, Field(ge=0)] = 6.0
+    facing: Annotated[Finite, Field(ge=0)] = 3.0
+    few: Annotated[int, Field(ge=1, le=50)] = 3
+    personal_space: Annotated[Finite, Field(ge=0, le=3)] = 0.7
+
+    def characters(self) -> tuple[CharacterSettings, ...]:
+        """Pairs on a square lattice, face to face."""
+        pairs = (self.count + 1) // 2
+        across = max(1, round(pairs**0.5))
+        shared = self.model_dump(exclude={"count", "spacing"})
+        out = []
+        for k in range(self.count):
+            row, column = divmod(k // 2, across)
+            x = 2.0 * self.spacing * (column - 0.5 * (across - 1))
+            z = 2.0 * self.spacing * (row - 0.5 * ((pairs - 1) // across))
+            side = 0.5 if k % 2 else -0.5
+            out.append(
+                CharacterSettings(
+                    name=f"boxer {k + 1}",
+                    position=(x, z + side * self.spacing),
+                    yaw_deg=180.0 if k % 2 else 0.0,
+                    aims_at=NEAREST,
+                    **shared,
+                )
+            )
+        return tuple(out)
+
+
 class SceneSettings(_Settings):
     title: Name
     about: str = ""
-    character: Annotated[tuple[CharacterSettings, ...], Field(min_length=1)]
+    character: tuple[CharacterSettings, ...] = ()
+    crowd: CrowdSettings | None = None
     object: tuple[ObjectSettings, ...] = ()
+
+    @cached_property
+    def characters(self) -> tuple[CharacterSettings, ...]:
+        """Those named one by one, then the crowd."""
+        return self.character + (self.crowd.characters() if self.crowd else ())
 
     @model_validator(mode="after")
     def _names_fit(self) -> SceneSettings:
-        names = [c.name for c in self.character] + [o.name for o in self.object]
+        if not self.character and self.crowd is None:
+            raise ValueError("nobody is in it; expected a [[character]] or a [crowd]")
+        if self.crowd is not None and self.crowd.approach + self.crowd.strike == 0:
+            raise ValueError("crowd: approach and strike are both 0; expected one above 0")
+        names = [c.name for c in self.characters] + [o.name for o in self.object]
         twice = sorted({n for n in names if names.count(n) > 1})
         if twice:
             raise ValueError(f"names used twice: {', '.join(twice)}")
         for c in self.character:
+            if c.aims_at == NEAREST and len(self.characters) > 1:
+                continue
             if c.aims_at == c.name or c.aims_at not in names:
                 others = ", ".join(n for n in names if n != c.name) or "nothing else"
                 raise ValueError(
                     f"{c.name} aims at {c.aims_at!r}; expected another name of the scene ({others})"
                 )
         return self
+
+
+def with_count(settings: SceneSettings, count: int) -> SceneSettings:
+    """The scene with another number of characters in its crowd. Errors: it has none; below 2."""
+    if settings.crowd is None:
+        raise KumiteError(
+            f"count: {settings.title!r} names its characters one by one; expected a scene with a "
+            "[crowd]"
+        )
+    if count < 2:
+        raise KumiteError(f"count: {count}, expected at least 2")
+    crowd = settings.crowd.model_copy(update={"count": count})
+    return SceneSettings.model_construct(**{**dict(settings), "crowd": crowd})
 
 
 def builtin_scenes() -> dict[str, SceneSettings]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kumite.clip import SIDES
+from kumite.clip import SIDES, Skeleton
 from kumite.graph import Library
 from kumite.kernels import character as kernels
 from kumite.kernels.blow import NO_BLOW
@@ -45,7 +45,9 @@ class Cast:
             library.contacts.on_ground,
             clips.clip_of_frame,
         )
-        self._build = kernels.Build(skeleton.parents, skeleton.offsets, np.array(legs))
+        self._build = kernels.Build(
+            skeleton.parents, skeleton.offsets, np.array(legs), _below(skeleton, legs)
+        )
         self.frame = np.zeros(count, dtype=np.int64)  # library frame shown
         self.stop = np.zeros(count, dtype=np.int64)  # last frame of the action: choose again there
         self.anchor = np.zeros((count, 3))  # library world → scene
@@ -59,6 +61,7 @@ class Cast:
         self._offsets = kernels.Offsets(
             *(np.zeros((count, *shape)) for shape in shapes for _ in ("offset", "velocity"))
         )
+        self._jump = np.zeros(count, dtype=bool)
         self.blow_of_frame = _blow_windows(library)
 
     @property
@@ -84,16 +87,25 @@ class Cast:
         for array in self._offsets:
             array[k] = 0.0
 
-    def begin(self, k: int, stretch: int) -> bool:
-        """Take an action from the state that the character is in; whether it is a jump."""
+    def begin(self, who: np.ndarray, stretch: np.ndarray) -> np.ndarray:
+        """Characters who [W] take actions, stretches [K], from the states they are in.
+
+        Whether each was a jump [K] bool, of those who did.
+        """
         table = self.library.table
-        source, target = int(self.frame[k]), int(table.first[stretch]) - 1
-        self.stop[k] = table.last[stretch]
-        self.frame[k] = target
-        if target == source:
-            return False
-        kernels.join(k, source, target, self.anchor, self._capture, self._offsets)
-        return True
+        kernels.begin(
+            who,
+            stretch,
+            table.first,
+            table.last,
+            self.frame,
+            self.stop,
+            self.anchor,
+            self._capture,
+            self._offsets,
+            self._jump,
+        )
+        return self._jump
 
     def advance(self) -> None:
         """Everyone one frame on, along the action begun."""
@@ -114,12 +126,10 @@ class Cast:
             self._poses,
         )
 
-    def shift(self, k: int, dx: float, dz: float) -> None:
-        """Carry a character over the ground [m]; planted feet stay where they are."""
-        self.anchor[k, 0] += dx
-        self.anchor[k, 1] += dz
-        self._offsets.foot[k, :, 0] -= dx
-        self._offsets.foot[k, :, 2] -= dz
+    @property
+    def foot_offset(self) -> np.ndarray:
+        """How far [K, 2, 3] planted feet are held from where the capture has them [m]."""
+        return self._offsets.foot
 
     def strike(self, k: int, joint: int, point: np.ndarray, displacement: np.ndarray) -> None:
         """Displace a struck segment: ``point`` moves by about ``displacement`` [3] and recovers.
@@ -138,6 +148,18 @@ class Cast:
         local = rotate(conjugate(self.world_wxyz[k, chain]), turn)
         rate = 2.0 * np.log(2.0) / REACTION_HALF_LIFE
         self._offsets.reaction_velocity[k, chain] += local * np.e * rate
+
+
+def _below(skeleton: Skeleton, legs: list[list[int]]) -> np.ndarray:
+    """The joints [2, N] that hang from each thigh, parents first, filled up with -1."""
+    out = np.full((len(legs), len(skeleton)), -1, dtype=np.int64)
+    for row, (thigh, _, _) in zip(out, legs):
+        found = [thigh]
+        for j in range(thigh + 1, len(skeleton)):
+            if skeleton.parents[j] in found:
+                found.append(j)
+        row[: len(found)] = found
+    return out
 
 
 def _blow_windows(library: Library) -> np.ndarray:
