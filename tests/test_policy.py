@@ -14,10 +14,13 @@ from kumite.control import (
     Behaviour,
     Fighters,
     Skill,
+    Station,
     TargetGrid,
     Temper,
     approach,
     approach_grid,
+    circle,
+    keep_off,
     solve,
     stretch_tracks,
     strike,
@@ -276,3 +279,117 @@ def test_grids_and_tempers_that_make_no_sense_are_refused():
         TargetGrid((0, 0, 0), (1, 1, 1), (1, 5, 1), wraps=False, inside_only=True)
     with pytest.raises(KumiteError, match="weights"):
         Temper(approach=0.0, strike=0.0)
+
+
+# Behaviours as data ------------------------------------------------------------------------------
+
+
+def _station_twin(behaviour, tracks, k: int, target: np.ndarray, fps: float) -> float:
+    """What the doc string of Station says, frame by frame."""
+    s = behaviour.station
+    a, b = tracks.centre_start[k : k + 2]
+    discount = behaviour.discount_per_second ** (1.0 / fps)
+    values, before = [], np.arctan2(-target[0], -target[2])
+    for t in range(a, b):
+        x, z, yaw = tracks.root[t]
+        point = tracks.centre[t] if s.point == "reach" else np.array([x, z])
+        good = np.exp(-abs(np.hypot(*(target[[0, 2]] - point)) - s.distance) / s.sigma)
+        if s.bearing is not None:
+            seen = np.arctan2(target[0] - x, target[2] - z) - yaw - np.radians(s.bearing)
+            seen = (seen + np.pi) % (2 * np.pi) - np.pi
+            good *= np.exp(-abs(seen) / np.radians(s.bearing_sigma))
+        if s.orbit:
+            angle = np.arctan2(x - target[0], z - target[2])
+            turned = (angle - before + np.pi) % (2 * np.pi) - np.pi
+            good *= np.clip(turned * fps / s.orbit, 0, 1)
+            before = angle
+        values.append(good * discount ** (t - a + 1))
+    return (1 - discount) * sum(values) if s.always else max(values)
+
+
+@pytest.mark.parametrize(
+    "station",
+    [
+        Station(distance=1.0),
+        Station(point="reach", sigma=0.1),
+        Station(distance=1.2, bearing=40.0, always=True),
+        Station(distance=1.1, sigma=0.3, bearing=0.0, orbit=-0.6, always=True),
+    ],
+)
+def test_station_rewards_equal_a_slow_twin(library: Library, station: Station):
+    behaviour = Behaviour("mine", approach_grid(), station=station)
+    tracks, fps = stretch_tracks(library), library.clips.fps
+    reward = stretch_rewards(behaviour, tracks, fps)
+    points = behaviour.grid.points
+    rng = np.random.default_rng(0)
+    for k, m in zip(rng.integers(0, len(reward), 40), rng.integers(1, len(points), 40)):
+        slow = _station_twin(behaviour, tracks, int(k), points[m], fps)
+        assert reward[k, m] == pytest.approx(slow, abs=1e-6)
+
+
+def test_keeping_off_backs_away_and_circling_goes_round(library: Library):
+    for name, behaviour in (("keep_off", keep_off(1.8)), ("circle", circle())):
+        policy = solve(library, behaviour)
+        skill = Skill(
+            library,
+            solve(library, approach()),
+            solve(library, strike(library)),
+            stretch_tracks(library),
+            (policy,),
+        )
+        temper = Temper(
+            0.0, 0.0, personal_space=0.0, facing=0.0, few=1, boredom=0.0, more={name: 1.0}
+        )
+        mind, tracks = Fighters(skill, [temper], 0), skill.tracks
+        state, target = 0, np.array([[0.0, 1.5, 0.9]])
+        far = np.full((1, 1, 2), 1e6)
+        turned = 0.0
+        for _ in range(8):
+            k = mind.pick(0, state, target, far)
+            a, b = tracks.centre_start[k : k + 2]
+            path = np.vstack([[0.0, 0.0], tracks.root[a:b, :2]])
+            angle = np.unwrap(np.arctan2(*(path - target[0, [0, 2]]).T))
+            turned += angle[-1] - angle[0]
+            x, z, yaw = library.table.displacement[k]
+            dx, dz = target[0, 0] - x, target[0, 2] - z
+            c, s = np.cos(yaw), np.sin(yaw)
+            target = np.array([[c * dx - s * dz, 1.5, s * dx + c * dz]])
+            state = int(library.table.target[k])
+        if name == "keep_off":
+            assert np.hypot(target[0, 0], target[0, 2]) > 1.35
+        else:
+            assert turned > 0.3
+
+
+def test_a_behaviour_counts_only_in_its_active_region(library: Library):
+    near = replace(keep_off(), name="near", farthest=1.0)
+    skill = Skill(
+        library,
+        solve(library, approach()),
+        solve(library, strike(library)),
+        stretch_tracks(library),
+        (solve(library, near),),
+    )
+    mind = Fighters(skill, [Temper(0.0, 0.0, facing=0.0, more={"near": 1.0})], 0)
+    far = np.full((1, 1, 2), 1e6)
+    mind.pick(0, 0, np.array([[0.0, 1.5, 0.9]]), far)
+    assert mind.choices.worth[0] > 0
+    mind.pick(0, 0, np.array([[0.0, 1.5, 1.1]]), far)
+    assert mind.choices.worth[0] == 0
+
+
+def test_behaviours_that_make_no_sense_are_refused():
+    grid = approach_grid()
+    with pytest.raises(KumiteError, match="unknown behaviour 'dance'"):
+        Behaviour("dance", grid)
+    with pytest.raises(KumiteError, match="expected body or reach"):
+        Station(point="nose")
+    with pytest.raises(KumiteError, match="sigmas above 0"):
+        Station(sigma=0.0)
+    with pytest.raises(KumiteError, match="active from 2"):
+        Behaviour("mine", grid, station=Station(), nearest=2.0, farthest=1.0)
+    temper = Temper()
+    with pytest.raises(KumiteError, match="not all 0"):
+        temper.set_weight("approach", 0.0)
+        temper.set_weight("strike", 0.0)
+    assert temper.approach == 0.0 and temper.strike == 6.0  # the last weight stays

@@ -119,7 +119,7 @@ def test_a_scene_file_is_read(tmp_path):
         (GOOD.replace("position = [0, 1]", "position = [0]"), r"character.1.position"),
         (GOOD.replace('aims_at = "b"', 'aims_at = "c"'), r"a aims at 'c'; expected another name"),
         (GOOD.replace('name = "b"', 'name = "a"'), "twice: a"),
-        (GOOD + "approach = 0\nstrike = 0\n", "at least one weight above 0"),
+        (GOOD + "approach = 0\nstrike = 0\n", "all weights are 0"),
         (GOOD + "strike = nan\n", "character.1.strike"),
         (
             GOOD + "weight = 1\n",
@@ -270,6 +270,50 @@ def test_decisions_are_logged_with_what_was_considered(fight: Recording):
     decisions = [e for e in fight.events if e.kind == "decision"]
     assert len(decisions) > 20
     assert all(e.data["considered"] >= 1 and e.data["apart"] >= 0 for e in decisions)
+
+
+def test_behaviours_are_named_in_scene_files_and_tuned_while_it_runs(library: Library, tmp_path):
+    file = tmp_path / "shy.toml"
+    file.write_text(
+        'title = "shy"\n[[character]]\nname = "red"\nposition = [0, -0.5]\naims_at = "ball"\n'
+        "strike = 0.0\napproach = 0.0\nbehaviours = { keep_off = 2.0 }\n"
+        '[[object]]\nname = "ball"\nposition = [0, 1.5, 0.3]\n'
+    )
+    scene = LiveScene(load_scene(str(file)), library, seed=0)
+    for _ in range(int(15 * scene.fps)):
+        scene.step()
+    away = np.hypot(*(scene.root_position[0, [0, 2]] - [0.0, 0.3]))
+    assert away > 1.15
+    assert not any(e.kind == "hit" for e in scene.events)
+    weights = {c.behaviour: c for c in scene.controls}
+    assert set(weights) == {"approach", "strike", "keep_off"} and weights["keep_off"].value == 2.0
+    weights["strike"].set(6.0)
+    weights["approach"].set(1.0)
+    weights["keep_off"].set(0.0)
+    for _ in range(int(25 * scene.fps)):
+        scene.step()
+    assert any(e.kind == "hit" for e in scene.events)
+    with pytest.raises(KumiteError, match="not all 0"):
+        for control in weights.values():
+            control.set(0.0)
+
+
+def test_unknown_behaviours_and_weights_all_zero_are_refused(library: Library, tmp_path):
+    two = [
+        {"name": n, "position": (0, z), "aims_at": o} for n, z, o in (("a", 0, "b"), ("b", 1, "a"))
+    ]
+
+    def scene(**changes) -> SceneSettings:
+        return SceneSettings.model_validate(
+            {"title": "x", "character": [{**two[0], **changes}, two[1]]}
+        )
+
+    with pytest.raises(KumiteError, match="unknown behaviour 'cirle'; did you mean 'circle'"):
+        LiveScene(scene(behaviours={"cirle": 1.0}), library)
+    with pytest.raises(KumiteError, match="has a weight of its own"):
+        LiveScene(scene(behaviours={"strike": 1.0}), library)
+    with pytest.raises(ValueError, match="all weights are 0"):
+        scene(approach=0.0, strike=0.0)
 
 
 # The target --------------------------------------------------------------------------------------

@@ -2,19 +2,34 @@
 
 from kumite.control.fighter import Fighters, Skill, Temper
 from kumite.control.grid import TargetGrid, approach_grid, strike_grid
-from kumite.control.policy import Behaviour, Policy, approach, solve, stretch_tracks, strike
+from kumite.control.policy import (
+    BEHAVIOURS,
+    Behaviour,
+    Policy,
+    Station,
+    approach,
+    circle,
+    keep_off,
+    solve,
+    stretch_tracks,
+    strike,
+)
 from kumite.control.trained import cache_folder, trained
 
 __all__ = [
+    "BEHAVIOURS",
     "Behaviour",
     "Fighters",
     "Policy",
     "Skill",
+    "Station",
     "TargetGrid",
     "Temper",
     "approach",
     "approach_grid",
     "cache_folder",
+    "circle",
+    "keep_off",
     "solve",
     "stretch_tracks",
     "strike",

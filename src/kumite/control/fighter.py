@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
-from kumite.control.policy import Policy, Tracks, frame_discount
+from kumite.control.policy import Policy, Tracks, frame_discount, reward_params
 from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.kernels import crowd as kernels
-from kumite.kernels.policy import Moves, Worth
+from kumite.kernels import policy as kernels_policy
+from kumite.kernels.policy import Behaviours, Moves
 
 MANY = 8  # characters that choose at once (1 ms of work) from which threads pay
 
@@ -29,12 +30,39 @@ class Temper:
     boredom: float = 0.5  # how much of its gain an action loses while it was used recently
     memory: int = 6  # how many actions back "recently" goes
     personal_space: float = 0.7  # m between the bodies that an action must leave
+    more: dict[str, float] = field(default_factory=dict)  # weights of other behaviours, by name
 
     def __post_init__(self) -> None:
-        if self.approach < 0 or self.strike < 0 or self.approach + self.strike == 0:
-            raise KumiteError("weights: approach and strike must not be below 0, nor both 0")
+        self._check_weights()
         if self.few < 1 or self.memory < 0:
             raise KumiteError("few: expected at least 1; memory: at least 0")
+
+    def _check_weights(self) -> None:
+        every = [self.approach, self.strike, *self.more.values()]
+        if not np.isfinite(every).all() or min(every) < 0 or sum(every) == 0:
+            raise KumiteError("weights: expected none below 0, and not all 0")
+
+    def weight(self, behaviour: str) -> float:
+        """The weight of a behaviour by name."""
+        if behaviour in ("approach", "strike"):
+            return float(getattr(self, behaviour))
+        return self.more.get(behaviour, 0.0)
+
+    def set_weight(self, behaviour: str, value: float) -> None:
+        """Another weight, from the next decision on. Errors: below 0; all would be 0."""
+        before = self.weight(behaviour)
+        self._put(behaviour, value)
+        try:
+            self._check_weights()
+        except KumiteError:
+            self._put(behaviour, before)
+            raise
+
+    def _put(self, behaviour: str, value: float) -> None:
+        if behaviour in ("approach", "strike"):
+            setattr(self, behaviour, value)
+        else:
+            self.more[behaviour] = value
 
 
 @dataclass(frozen=True)
@@ -45,6 +73,7 @@ class Skill:
     approach: Policy
     strike: Policy
     tracks: Tracks
+    more: tuple[Policy, ...] = ()  # of other behaviours
 
     @cached_property
     def moves(self) -> Moves:
@@ -66,17 +95,29 @@ class Skill:
             tracks.tip_start,
         )
 
-    def worth(self, policy: Policy) -> Worth:
-        """A policy as the kernels take it."""
-        behaviour = policy.behaviour
-        scale = behaviour.sigma if behaviour.name == "approach" else behaviour.tolerance
-        discount = frame_discount(behaviour, self.library.clips.fps)
-        low, step, size, wraps, inside_only = policy.grid_arguments
-        return Worth(policy.value, low, step, size, wraps, inside_only, discount, scale)
+    @property
+    def policies(self) -> tuple[Policy, ...]:
+        return (self.approach, self.strike, *self.more)
 
     @cached_property
-    def worths(self) -> tuple[Worth, Worth]:
-        return self.worth(self.approach), self.worth(self.strike)
+    def behaviours(self) -> Behaviours:
+        """All behaviours as the kernels take them."""
+        fps = self.library.clips.fps
+        every = [p.behaviour for p in self.policies]
+        grids = [p.grid_arguments for p in self.policies]
+        kinds = {"approach": kernels_policy.APPROACH, "strike": kernels_policy.STRIKE}
+        sizes = [p.value.size for p in self.policies]
+        return Behaviours(
+            np.array([kernels_policy.STATION if b.station else kinds[b.name] for b in every]),
+            np.stack([reward_params(b, fps) for b in every]),
+            np.array([frame_discount(b, fps) for b in every]),
+            np.array([(b.nearest, b.farthest) for b in every]),
+            np.concatenate([p.value.ravel() for p in self.policies]),
+            np.concatenate([[0], np.cumsum(sizes)]),
+            np.array([p.value.shape[1] for p in self.policies]),
+            *(np.stack([g[c] for g in grids]) for c in range(3)),
+            *(np.array([g[c] for g in grids]) for c in (3, 4)),
+        )
 
 
 class Fighters:
@@ -91,7 +132,8 @@ class Fighters:
         count = len(self.tempers)
         memory = max((t.memory for t in self.tempers), default=0)
         self.minds = kernels.Minds(
-            np.zeros((count, 7)),
+            np.zeros((count, len(skill.policies))),
+            np.zeros((count, 5)),
             np.full((count, memory), -1, dtype=np.int64),
             np.zeros(count, dtype=np.int64),
             np.random.SeedSequence(seed).generate_state(count, np.uint64),
@@ -105,17 +147,12 @@ class Fighters:
 
     def _note(self, who: np.ndarray) -> None:
         """The tempers of those who are about to choose, as they are now."""
+        names = [p.behaviour.name for p in self.skill.more]
         for k in who.tolist():
             t = self.tempers[k]
-            self.minds.temper[k] = (
-                t.approach,
-                t.strike,
-                t.facing,
-                t.few,
-                t.slack,
-                t.boredom,
-                t.personal_space,
-            )
+            more = [t.more.get(name, 0.0) for name in names]
+            self.minds.weights[k] = (t.approach, t.strike, *more)
+            self.minds.temper[k] = (t.facing, t.few, t.slack, t.boredom, t.personal_space)
 
     def decide(
         self,
@@ -133,8 +170,8 @@ class Fighters:
         """
         self._note(who)
         run = kernels.decide_many if len(who) >= MANY else kernels.decide
-        moves, worths = self.skill.moves, self.skill.worths
-        run(who, states, place, grid, actors, self.minds, moves, *worths, horizon, self.choices)
+        moves, behaviours = self.skill.moves, self.skill.behaviours
+        run(who, states, place, grid, actors, self.minds, moves, behaviours, horizon, self.choices)
         return self.choices
 
     def pick(self, k: int, state: int, target: np.ndarray, others: np.ndarray) -> int:
@@ -144,6 +181,6 @@ class Fighters:
         of bodies to keep apart from; in its facing frame, the last row from then on.
         """
         self._note(np.array([k]))
-        moves, worths = self.skill.moves, self.skill.worths
-        kernels.pick(k, state, target, others, self.minds, moves, *worths, self.choices)
+        moves, behaviours = self.skill.moves, self.skill.behaviours
+        kernels.pick(k, state, target, others, self.minds, moves, behaviours, self.choices)
         return int(self.choices.stretch[k])

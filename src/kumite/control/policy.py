@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -72,23 +72,73 @@ def stretch_tracks(library: Library, limbs: tuple[str, ...] = LIMBS) -> Tracks:
 
 
 @dataclass(frozen=True)
-class Behaviour:
-    """What is rewarded, and where it is looked up."""
+class Station:
+    """A reward: to be somewhere with respect to the target, at some moment or all the time."""
 
-    name: str  # approach or strike
+    point: str = "body"  # what is brought there: the body, or the "reach" (where blows land)
+    distance: float = 0.0  # m wanted from the target
+    sigma: float = 0.2  # m, how sharply
+    bearing: float | None = None  # deg to the left of straight ahead where the target is wanted
+    bearing_sigma: float = 30.0  # deg, how sharply
+    orbit: float = 0.0  # rad/s wanted round the target: + to the avatar's right hand; 0: none
+    always: bool = False  # all the time, not at the best moment
+
+    def __post_init__(self) -> None:
+        if self.point not in ("body", "reach"):
+            raise KumiteError(f"station: point {self.point!r}, expected body or reach")
+        if not (self.distance >= 0 and self.sigma > 0 and self.bearing_sigma > 0):
+            raise KumiteError("station: expected distance not below 0 m, sigmas above 0")
+        if not np.isfinite([self.distance, self.orbit, self.bearing or 0.0]).all():
+            raise KumiteError("station: distance, bearing and orbit must be finite")
+
+
+@dataclass(frozen=True)
+class Behaviour:
+    """What is rewarded, where it is looked up, and where it counts: data, so a user adds one."""
+
+    name: str
     grid: TargetGrid
     discount_per_second: float = DISCOUNT_PER_SECOND
     sigma: float = 0.10  # m, how sharply approaching is rewarded (Eq. 5)
     tolerance: float = 0.15  # m, how near a blow must pass to count (Eq. 6)
     limbs: tuple[str, ...] = LIMBS
+    station: Station | None = None  # what is rewarded, if not approaching or striking
+    nearest: float = 0.0  # m: the behaviour counts only while its target is that far off
+    farthest: float = float("inf")  # m
 
     def __post_init__(self) -> None:
-        if self.name not in ("approach", "strike"):
-            raise KumiteError(f"unknown behaviour {self.name!r}; expected approach or strike")
+        if self.station is None and self.name not in ("approach", "strike"):
+            raise KumiteError(
+                f"unknown behaviour {self.name!r}: expected approach, strike, or one with a station"
+            )
+        if not 0 <= self.nearest < self.farthest:
+            raise KumiteError(f"{self.name}: active from {self.nearest} to {self.farthest} m")
         if not 0 < self.discount_per_second < 1:
             raise KumiteError("discount_per_second: expected more than 0 and less than 1")
         if not (self.sigma > 0 and self.tolerance > 0):
             raise KumiteError("sigma and tolerance: expected more than 0 m")
+
+
+def keep_off(distance: float = 1.5) -> Behaviour:
+    """Stay at a distance [m], the target in front: retreat from one that comes nearer."""
+    station = Station(distance=distance, sigma=0.25, bearing=0.0, always=True)
+    return Behaviour("keep_off", approach_grid(), station=station)
+
+
+def circle(distance: float = 1.1, orbit: float = 0.7) -> Behaviour:
+    """Go round the target at a distance [m] and a rate [rad/s], facing it."""
+    station = Station(distance=distance, sigma=0.3, bearing=0.0, orbit=orbit, always=True)
+    return Behaviour("circle", approach_grid(), station=station)
+
+
+BEHAVIOURS: dict[str, Callable[[Library], Behaviour]] = {
+    "approach": lambda library: approach(),
+    "strike": lambda library: strike(library),
+    "keep_off": lambda library: keep_off(),
+    "circle": lambda library: circle(),
+    "circle_back": lambda library: replace(circle(orbit=-0.7), name="circle_back"),
+}
+"""Behaviours that scenes may name."""
 
 
 def approach(**changes) -> Behaviour:
@@ -123,12 +173,36 @@ def frame_discount(behaviour: Behaviour, fps: float) -> float:
     return behaviour.discount_per_second ** (1.0 / fps)
 
 
+def reward_params(behaviour: Behaviour, fps: float) -> np.ndarray:
+    """What a behaviour rewards [7], as the kernels take it."""
+    out = np.zeros(7)
+    s = behaviour.station
+    if s is None:
+        near = behaviour.name == "approach"
+        out[kernels.SIGMA] = behaviour.sigma if near else behaviour.tolerance
+        return out
+    out[kernels.POINT] = s.point == "reach"
+    out[kernels.DISTANCE], out[kernels.SIGMA] = s.distance, s.sigma
+    if s.bearing is not None:
+        out[kernels.BEARING] = np.radians(s.bearing)
+        out[kernels.BEARING_SIGMA] = np.radians(s.bearing_sigma)
+    out[kernels.ORBIT], out[kernels.ALWAYS] = s.orbit / fps, s.always
+    return out
+
+
 def stretch_rewards(behaviour: Behaviour, tracks: Tracks, fps: float) -> np.ndarray:
     """R [L, M] float32 of every stretch for the target at every grid point."""
     points = behaviour.grid.points
     out = np.empty((len(tracks.tip_start) - 1, len(points)), dtype=np.float32)
     discount = frame_discount(behaviour, fps)
-    if behaviour.name == "approach":
+    if behaviour.station is not None:
+        x, z, yaw = tracks.root.T
+        root = np.stack([x, z, np.sin(yaw), np.cos(yaw)], axis=1)
+        params = reward_params(behaviour, fps)
+        kernels.station_rewards(
+            root, tracks.centre, tracks.centre_start, params, discount, points, out
+        )
+    elif behaviour.name == "approach":
         kernels.approach_rewards(
             tracks.centre, tracks.centre_start, discount, behaviour.sigma, points, out
         )

@@ -21,7 +21,7 @@ NEIGHBOURS = 6  # bodies that a character minds, its opponent among them
 MINDED = 2.2  # m within which it does
 CELL = 2.2  # m, edge of a cell of the hash: no smaller than any radius asked for
 FAR = 1e6  # m, where nobody is
-APPROACH, STRIKE, FACING, FEW, SLACK, BOREDOM, SPACE = range(7)
+FACING, FEW, SLACK, BOREDOM, SPACE = range(5)
 """Columns of a temper."""
 
 
@@ -50,7 +50,8 @@ class Actors(NamedTuple):
 class Minds(NamedTuple):
     """How each character chooses, and what it remembers."""
 
-    temper: np.ndarray  # [K, 7]
+    weights: np.ndarray  # [K, Z] of the behaviours
+    temper: np.ndarray  # [K, 5]
     recent: np.ndarray  # [K, M] stretches, or -1
     recent_at: np.ndarray  # [K] where the next one is written
     seed: np.ndarray  # [K] uint64
@@ -167,7 +168,7 @@ def foresee(k, here, actors, target, other):
 
 
 @kernel
-def decide_one(k, state, place, grid, actors, minds, moves, near, hit, horizon, choices):
+def decide_one(k, state, place, grid, actors, minds, moves, behaviours, horizon, choices):
     """Character k, in a state, picks its next action; place [K, 3] is where all stand.
 
     The same as the paper's choice by value, with weights; random among the best few (A9).
@@ -191,32 +192,18 @@ def decide_one(k, state, place, grid, actors, minds, moves, near, hit, horizon, 
                 x, z = planar_point(actors.anchor[j], actors.root[g, 0], actors.root[g, 2])
                 others[count, h, 0], others[count, h, 1] = seen_from(here, x, z)
             count += 1
-    pick(k, state, target, others[:count], minds, moves, near, hit, choices)
+    pick(k, state, target, others[:count], minds, moves, behaviours, choices)
 
 
 @kernel
-def pick(k, state, target, others, minds, moves, near, hit, choices):
+def pick(k, state, target, others, minds, moves, behaviours, choices):
     """Character k picks among the actions of a state, with target [H, 3] and others [O, H, 2]."""
     temper = minds.temper[k]
-    # A target out of the grid is approached as if it stood on its rim: each action brings it
-    # nearer. (Were the place after the action clamped instead, no way of getting there would be
-    # better than another.)
-    goal = target
-    away = np.hypot(target[0, 0], target[0, 2])
-    rim = near.low[1] + near.step[1] * (near.size[1] - 1)
-    if away > rim:
-        share = 1.0 - rim / away
-        goal = target.copy()
-        for h in range(target.shape[0]):
-            goal[h, 0] -= share * target[0, 0]
-            goal[h, 2] -= share * target[0, 2]
     begin, end = moves.action_start[state], moves.action_start[state + 1]
     count = end - begin
     worth, gap = np.empty(count), np.empty(count)
-    look_ahead(
-        state, goal, target, others, moves, near, hit,
-        temper[APPROACH], temper[STRIKE], temper[FACING], worth, gap,
-    )  # fmt: skip
+    weights = minds.weights[k]
+    look_ahead(state, target, others, moves, behaviours, weights, temper[FACING], worth, gap)
     apart, widest = 0, -1.0
     for n in range(count):
         apart += gap[n] >= temper[SPACE]
@@ -264,19 +251,19 @@ def pick(k, state, target, others, minds, moves, near, hit, choices):
 
 
 @kernel
-def decide(who, states, place, grid, actors, minds, moves, near, hit, horizon, choices):
+def decide(who, states, place, grid, actors, minds, moves, behaviours, horizon, choices):
     """Every character of who [W], in its state [W], picks its next action: all at once."""
     for w in range(who.shape[0]):
         k = who[w]
-        decide_one(k, states[w], place, grid, actors, minds, moves, near, hit, horizon, choices)
+        decide_one(k, states[w], place, grid, actors, minds, moves, behaviours, horizon, choices)
 
 
 @parallel_kernel
-def decide_many(who, states, place, grid, actors, minds, moves, near, hit, horizon, choices):
+def decide_many(who, states, place, grid, actors, minds, moves, behaviours, horizon, choices):
     """:func:`decide` on all cores."""
     for w in prange(who.shape[0]):
         k = who[w]
-        decide_one(k, states[w], place, grid, actors, minds, moves, near, hit, horizon, choices)
+        decide_one(k, states[w], place, grid, actors, minds, moves, behaviours, horizon, choices)
 
 
 @kernel

@@ -202,86 +202,178 @@ class Moves(NamedTuple):
     tip_start: np.ndarray  # [L + 1]
 
 
-class Worth(NamedTuple):
-    """A solved behaviour, and how its reward is scaled."""
+class Behaviours(NamedTuple):
+    """Solved behaviours, Z of them, and what each rewards."""
 
-    value: np.ndarray  # [N, M] float32
-    low: np.ndarray  # the grid: see corners()
-    step: np.ndarray
-    size: np.ndarray
-    wraps: bool
-    inside_only: bool
-    discount: float  # per frame
-    scale: float  # m, σ of approaching or the tolerance of striking
+    kind: np.ndarray  # [Z] APPROACH, STRIKE or STATION
+    params: np.ndarray  # [Z, 7]: see Station's columns; σ of approaching, tolerance of striking
+    discount: np.ndarray  # [Z] per frame
+    active: np.ndarray  # [Z, 2] m, nearest and farthest target for which it counts
+    value: np.ndarray  # flat float32, one behaviour after the other: [N, M of it]
+    start: np.ndarray  # [Z + 1]
+    points: np.ndarray  # [Z] M of each
+    low: np.ndarray  # [Z, 3] the grids: see corners()
+    step: np.ndarray  # [Z, 3]
+    size: np.ndarray  # [Z, 3]
+    wraps: np.ndarray  # [Z] bool
+    inside_only: np.ndarray  # [Z] bool
+
+
+APPROACH, STRIKE, STATION = range(3)
+POINT, DISTANCE, SIGMA, BEARING, BEARING_SIGMA, ORBIT, ALWAYS = range(7)
+"""Columns of params. POINT: 0 the body, 1 where blows land; ORBIT in rad a frame."""
 
 
 @kernel
-def worth_later(worth, state, x, y, z, index, weight):
-    """The interpolated value of a state with the target at a point of its facing frame."""
+def station_reward(root, centre, params, discount, target, sx, sz):
+    """How well a stretch keeps a station: a distance, a bearing, a way round the target.
+
+    root [T, 4], centre [T, 2]: the stretch's tracks; target [H, 3] foreseen, moved by (-sx, -sz).
+    max_t γ^t s(t), or (1 - γ) Σ γ^t s(t), with s the product of exp(-|distance - wanted| / σ), the
+    same of the bearing, and the share of the wanted turning round the target.
+    """
+    best, total, factor = 0.0, 0.0, 1.0
+    before = np.nan
+    for t in range(root.shape[0]):
+        h = min(t, target.shape[0] - 1)
+        tx, tz = target[h, 0] - sx, target[h, 2] - sz
+        factor *= discount
+        x, z = tx - root[t, 0], tz - root[t, 1]
+        if params[POINT] == 0.0:
+            d = np.hypot(x, z)
+        else:
+            d = np.hypot(tx - centre[t, 0], tz - centre[t, 1])
+        s = np.exp(-abs(d - params[DISTANCE]) / params[SIGMA])
+        if params[BEARING_SIGMA] > 0.0:
+            left, ahead = x * root[t, 3] - z * root[t, 2], x * root[t, 2] + z * root[t, 3]
+            off = np.arctan2(left, ahead) - params[BEARING]
+            off -= 2.0 * np.pi * np.floor((off + np.pi) / (2.0 * np.pi))
+            s *= np.exp(-abs(off) / params[BEARING_SIGMA])
+        if params[ORBIT] != 0.0:
+            round_it = np.arctan2(-x, -z)
+            if t == 0:
+                before = np.arctan2(-tx, -tz)
+            turned = round_it - before
+            turned -= 2.0 * np.pi * np.floor((turned + np.pi) / (2.0 * np.pi))
+            s *= min(max(turned / params[ORBIT], 0.0), 1.0)
+            before = round_it
+        best = max(best, factor * s)
+        total += factor * s
+    return (1.0 - discount) * total if params[ALWAYS] != 0.0 else best
+
+
+@parallel_kernel
+def station_rewards(root, centre, start, params, discount, points, out):
+    """Rewards [L, M] of stretches for targets [M, 3] that stand still."""
+    for s in prange(out.shape[0]):
+        a, b = start[s], start[s + 1]
+        for m in range(points.shape[0]):
+            out[s, m] = station_reward(
+                root[a:b], centre[a:b], params, discount, points[m : m + 1], 0.0, 0.0
+            )
+
+
+@kernel
+def worth_later(all_of, b, state, x, y, z, index, weight):
+    """Behaviour b's interpolated value of a state with the target at a point of its frame."""
+    first = all_of.start[b] + state * all_of.points[b]
     return interpolate(
-        worth.value[state],
+        all_of.value[first : first + all_of.points[b]],
         x,
         y,
         z,
-        worth.low,
-        worth.step,
-        worth.size,
-        worth.wraps,
-        worth.inside_only,
+        all_of.low[b],
+        all_of.step[b],
+        all_of.size[b],
+        all_of.wraps[b],
+        all_of.inside_only[b],
         index,
         weight,
     )
 
 
 @kernel
-def look_ahead(state, goal, target, others, moves, near, hit, approach, strike, facing, worth, gap):
+def reward_now(k, kind, params, discount, target, sx, sz, moves):
+    """R of stretch k for a target [H, 3], foreseen and moved by (-sx, -sz)."""
+    horizon = target.shape[0] - 1
+    first, last = moves.start[k], moves.start[k + 1]
+    best, factor = 0.0, 1.0
+    if kind == STATION:
+        part = slice(first, last)
+        return station_reward(
+            moves.root[part], moves.centre[part], params, discount, target, sx, sz
+        )
+    if kind == STRIKE:
+        for p in range(moves.tip_start[k], moves.tip_start[k + 1]):
+            h = min(moves.tip_when[p] - 1, horizon)
+            dx, dz = moves.tip[p, 0] - target[h, 0] + sx, moves.tip[p, 2] - target[h, 2] + sz
+            dy = moves.tip[p, 1] - target[h, 1]
+            if dx * dx + dy * dy + dz * dz <= params[SIGMA] * params[SIGMA]:
+                best = max(best, discount ** moves.tip_when[p] * moves.tip_weight[p])
+        return best
+    nearest = np.inf
+    for t in range(last - first):
+        factor *= discount
+        if factor <= best:
+            break
+        h = min(t, horizon)
+        dx = moves.centre[first + t, 0] - target[h, 0] + sx
+        dz = moves.centre[first + t, 1] - target[h, 2] + sz
+        d2 = dx * dx + dz * dz
+        if d2 < nearest:  # later and farther off is never better
+            nearest = d2
+            best = max(best, factor * np.exp(-np.sqrt(d2) / params[SIGMA]))
+    return best
+
+
+@kernel
+def look_ahead(state, target, others, moves, behaviours, weights, facing, worth, gap):
     """One step of Eq. 4 at run time, exact in the continuous target, for every action of a state.
 
     target [H, 3]: where the target is expected at frames 1.. after the decision, seen from the
-    avatar's facing frame; the last row holds from then on. goal [H, 3]: the same for approaching,
-    brought within the reach of its grid. others [O, H, 2]: the same for bodies that must not be run
-    into. approach, strike, facing: weights. Fills worth [n] with the weighted values, cut down by
-    exp(-facing) for each unit by which the target is out of a cone ahead (in cosine, mean over the
-    action), and gap [n] with the smallest distance kept to the other bodies.
+    avatar's facing frame; the last row holds from then on. others [O, H, 2]: the same for bodies
+    that must not be run into. weights [Z] of the behaviours; one counts only while the target is in
+    its active region. Fills worth [n] with the weighted values, cut down by exp(-facing) for each
+    unit by which the target is out of a cone ahead (in cosine, mean over the action), and gap [n]
+    with the smallest distance kept to the other bodies.
     """
     index = np.zeros(8, dtype=np.int64)
     weight = np.zeros(8)
     horizon = target.shape[0] - 1
-    for n, a in enumerate(range(moves.action_start[state], moves.action_start[state + 1])):
-        k = moves.stretch[a]
+    begin, end = moves.action_start[state], moves.action_start[state + 1]
+    worth[:] = 0.0
+    away = np.hypot(target[0, 0], target[0, 2])
+    for b in range(behaviours.kind.shape[0]):
+        if weights[b] == 0.0 or not behaviours.active[b, 0] <= away <= behaviours.active[b, 1]:
+            continue
+        # A target out of the grid is looked at as if it stood on its rim: each action brings it
+        # nearer. (Were the place after the action clamped instead, no way of getting there would
+        # be better than another.)
+        share = 0.0
+        if not behaviours.inside_only[b]:
+            rim = behaviours.low[b, 1] + behaviours.step[b, 1] * (behaviours.size[b, 1] - 1)
+            share = max(0.0, 1.0 - rim / max(away, 1e-9))
+        sx, sz = share * target[0, 0], share * target[0, 2]
+        for n in range(end - begin):
+            k = moves.stretch[begin + n]
+            now = reward_now(
+                k,
+                behaviours.kind[b],
+                behaviours.params[b],
+                behaviours.discount[b],
+                target,
+                sx,
+                sz,
+                moves,
+            )
+            h = min(moves.duration[k], horizon + 1) - 1
+            x, z = carry(moves.displacement[k], target[h, 0] - sx, target[h, 2] - sz)
+            y = target[h, 1]
+            later = worth_later(behaviours, b, moves.successor[k], x, y, z, index, weight)
+            worth[n] += weights[b] * (now + behaviours.discount[b] ** moves.duration[k] * later)
+    for n in range(end - begin):
+        k = moves.stretch[begin + n]
         first, last = moves.start[k], moves.start[k + 1]
-        end = min(moves.duration[k], horizon + 1) - 1
-        worth[n] = 0.0
-        if approach != 0.0:
-            best, factor, nearest = 0.0, 1.0, np.inf
-            for t in range(last - first):
-                factor *= near.discount
-                if factor <= best:
-                    break
-                h = min(t, horizon)
-                dx, dz = (
-                    moves.centre[first + t, 0] - goal[h, 0],
-                    moves.centre[first + t, 1] - goal[h, 2],
-                )
-                d2 = dx * dx + dz * dz
-                if d2 < nearest:  # later and farther off is never better
-                    nearest = d2
-                    best = max(best, factor * np.exp(-np.sqrt(d2) / near.scale))
-            x, z = carry(moves.displacement[k], goal[end, 0], goal[end, 2])
-            later = worth_later(near, moves.successor[k], x, 0.0, z, index, weight)
-            worth[n] += approach * (best + near.discount ** moves.duration[k] * later)
-        if strike != 0.0:
-            best = 0.0
-            for p in range(moves.tip_start[k], moves.tip_start[k + 1]):
-                h = min(moves.tip_when[p] - 1, horizon)
-                d2 = 0.0
-                for c in range(3):
-                    d2 += (moves.tip[p, c] - target[h, c]) ** 2
-                if d2 <= hit.scale * hit.scale:
-                    best = max(best, hit.discount ** moves.tip_when[p] * moves.tip_weight[p])
-            x, z = carry(moves.displacement[k], target[end, 0], target[end, 2])
-            later = worth_later(hit, moves.successor[k], x, target[end, 1], z, index, weight)
-            worth[n] += strike * (best + hit.discount ** moves.duration[k] * later)
         near2, astray = np.inf, 0.0
         for t in range(last - first):
             h = min(t, horizon)

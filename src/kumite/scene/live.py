@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from kumite.body import lay_body
 from kumite.clip import LIMBS
-from kumite.control import Fighters, Skill, Temper, approach, stretch_tracks, strike, trained
-from kumite.errors import KumiteError
+from kumite.control import (
+    BEHAVIOURS,
+    Behaviour,
+    Fighters,
+    Skill,
+    Temper,
+    approach,
+    stretch_tracks,
+    strike,
+    trained,
+)
+from kumite.errors import KumiteError, unknown
 from kumite.graph import Library
 from kumite.kernels import crowd as kernels
 from kumite.kernels.blow import NO_BLOW, NO_HIT, NOBODY, swept_contact
@@ -32,7 +43,28 @@ RECOIL = 0.018  # m that a struck segment gives way per m/s of the blow
 SWING = 0.35  # m/s that a struck target gains per m/s of the blow
 SWING_RATE = 7.0  # rad/s of the target's pendulum
 SWING_DAMPING = 0.25  # of critical
+FEW_TO_TUNE = 4  # characters that each have their own sliders
 REPAIRING = 1.0  # s after which those who aim at the nearest look round again
+
+
+class WeightControl:
+    """The weight of a behaviour, of one character or of all: a control of the studio."""
+
+    minimum, maximum = 0.0, 12.0
+
+    def __init__(self, name: str, behaviour: str, tempers: Sequence[Temper]) -> None:
+        self.name = name
+        self.behaviour = behaviour
+        self.tempers = tempers
+
+    @property
+    def value(self) -> float:
+        return self.tempers[0].weight(self.behaviour)
+
+    def set(self, value: float) -> None:
+        """Errors: the last weight above 0 cannot be taken away."""
+        for temper in self.tempers:
+            temper.set_weight(self.behaviour, value)
 
 
 class LiveScene:
@@ -48,8 +80,13 @@ class LiveScene:
         *,
         seed: int = 0,
         cache: Path | None = None,
+        behaviours: Mapping[str, Behaviour] | None = None,
         progress: Callable[[str, int, float], None] = lambda name, sweep, residual: None,
     ) -> None:
+        """behaviours: a user's own by name, besides those of :data:`kumite.control.BEHAVIOURS`.
+
+        Errors: a library that nobody can strike with, an unknown behaviour, too many characters.
+        """
         self.settings = settings
         self.library = library
         self.title = settings.title
@@ -68,11 +105,13 @@ class LiveScene:
                 f"none of the library's {len(library.strikes)} blows is in the connected part of "
                 "its graph: nobody can strike; build it with more clips or more --per-second"
             )
+        more = self._named_behaviours(behaviours or {})
         self.skill = Skill(
             library,
             trained(library, approach(), cache, progress=progress),
             trained(library, strike(library), cache, progress=progress),
             tracks,
+            tuple(trained(library, b, cache, progress=progress) for b in more),
         )
         self.body = lay_body(self.skeleton)
         self._shapes = self._lay_shapes()
@@ -83,10 +122,45 @@ class LiveScene:
         self._head = position[:, joint] + rotate(world[:, joint], middle)  # [F, 3] library world
         self._horizon = max(1, round(ANTICIPATION * self.fps))
         self.tempers = [
-            Temper(c.approach, c.strike, c.facing, c.few, personal_space=c.personal_space)
+            Temper(
+                c.approach,
+                c.strike,
+                c.facing,
+                c.few,
+                personal_space=c.personal_space,
+                more=dict(c.behaviours),
+            )
             for c in settings.characters
         ]
         self.reset(seed)
+
+    def _named_behaviours(self, own: Mapping[str, Behaviour]) -> list[Behaviour]:
+        """Those that the scene or the user names, besides approach and strike."""
+        names = {n: None for c in self.settings.characters for n in c.behaviours} | dict.fromkeys(
+            own
+        )
+        known = [*BEHAVIOURS, *own]
+        out = []
+        for name in names:
+            if name in ("approach", "strike"):
+                raise KumiteError(f"behaviours: {name} has a weight of its own ({name} = …)")
+            if name not in known:
+                raise unknown("behaviour", name, known)
+            found = own[name] if name in own else BEHAVIOURS[name](self.library)
+            out.append(replace(found, name=name))
+        return out
+
+    @property
+    def controls(self) -> list[WeightControl]:
+        """What the studio may tune while the scene runs: each behaviour's weight."""
+        names = ("approach", "strike", *(p.behaviour.name for p in self.skill.more))
+        if len(self.tempers) > FEW_TO_TUNE:
+            return [WeightControl(n, n, self.tempers) for n in names]
+        return [
+            WeightControl(f"{who}: {n}", n, [temper])
+            for who, temper in zip(self.names, self.tempers)
+            for n in names
+        ]
 
     def _lay_shapes(self) -> kernels.Shapes:
         """Where blows land on a body, and with what limbs strike."""

@@ -17,6 +17,7 @@ from kumite.errors import KumiteError
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Metres = Annotated[float, Field(ge=-1000, le=1000)]  # recordings keep single precision
 Name = Annotated[str, Field(min_length=1, max_length=60)]
+Weight = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 NEAREST = "nearest"  # aims at the nearest character that is free
 CROWD_SPACING = 1.5  # m between the two of a pair; pairs stand twice as far apart
 
@@ -32,14 +33,15 @@ class CharacterSettings(_Settings):
     aims_at: Name  # a character (its head), an object, or "nearest"
     approach: Annotated[Finite, Field(ge=0)] = 1.0  # weights of the behaviours
     strike: Annotated[Finite, Field(ge=0)] = 6.0
+    behaviours: dict[str, Weight] = {}  # weights of others, by name
     facing: Annotated[Finite, Field(ge=0)] = 3.0
     few: Annotated[int, Field(ge=1, le=50)] = 3  # drawn from the best few actions
     personal_space: Annotated[Finite, Field(ge=0, le=3)] = 0.7  # m kept to the other's body
 
     @model_validator(mode="after")
     def _some_weight(self) -> CharacterSettings:
-        if self.approach + self.strike == 0:
-            raise ValueError("approach and strike are both 0; expected at least one weight above 0")
+        if self.approach + self.strike + sum(self.behaviours.values()) == 0:
+            raise ValueError("all weights are 0; expected approach, strike or another above 0")
         return self
 
 
@@ -57,6 +59,7 @@ class CrowdSettings(_Settings):
     spacing: Annotated[Finite, Field(ge=0.8, le=20)] = CROWD_SPACING  # m
     approach: Annotated[Finite, Field(ge=0)] = 1.0
     strike: Annotated[Finite, Field(ge=0)] = 6.0
+    behaviours: dict[str, Weight] = {}
     facing: Annotated[Finite, Field(ge=0)] = 3.0
     few: Annotated[int, Field(ge=1, le=50)] = 3
     personal_space: Annotated[Finite, Field(ge=0, le=3)] = 0.7
@@ -100,8 +103,6 @@ class SceneSettings(_Settings):
     def _names_fit(self) -> SceneSettings:
         if not self.character and self.crowd is None:
             raise ValueError("nobody is in it; expected a [[character]] or a [crowd]")
-        if self.crowd is not None and self.crowd.approach + self.crowd.strike == 0:
-            raise ValueError("crowd: approach and strike are both 0; expected one above 0")
         names = [c.name for c in self.characters] + [o.name for o in self.object]
         twice = sorted({n for n in names if names.count(n) > 1})
         if twice:
