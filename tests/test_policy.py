@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kumite.annotate import Contacts, Strikes
 from kumite.control import (
     Behaviour,
     Fighters,
@@ -36,18 +35,6 @@ from tests import reference, toys
 FPS = 30.0
 
 
-def toy_library(table: ActionTable, frames: int, tips: dict[int, tuple] | None = None) -> Library:
-    """A library whose body stands still; tips: frame -> (place [3], speed) of left-hand hits."""
-    clips = toys.clip_set([frames])
-    effective = np.zeros((frames, 4), bool)
-    tip, speed = np.zeros((frames, 4, 3)), np.zeros((frames, 4))
-    for f, (place, v) in (tips or {}).items():
-        effective[f, 0], tip[f, 0], speed[f, 0] = True, place, v
-    empty = np.zeros(0, np.int32)
-    strikes = Strikes(effective, tip, speed, empty, empty, empty, empty, np.zeros((0, 3)))
-    return Library(clips, Contacts(np.ones((frames, 2), bool), np.zeros((2, 2))), strikes, table)
-
-
 def two_states(displacement=((0, 0, 0), (0, 0, 0))) -> ActionTable:
     """State 0 at frame 3 and state 1 at frame 8 take turns: 5 frames there, 3 frames back."""
     return ActionTable(
@@ -66,7 +53,7 @@ def two_states(displacement=((0, 0, 0), (0, 0, 0))) -> ActionTable:
 def test_two_states_in_closed_form():
     """A hit in the first action, none in the second: V0 = r + γ^5 V1, V1 = γ^3 V0."""
     place = (0.1, 1.5, 0.6)
-    library = toy_library(two_states(), 10, {5: (place, 4.0)})
+    library = toys.library(two_states(), 10, {5: (place, 4.0)})
     grid = TargetGrid((-0.5, 0.3, 1.2), (0.5, 0.9, 1.8), (3, 3, 3), wraps=False, inside_only=True)
     behaviour = Behaviour("strike", grid, tolerance=0.2)
     solved = solve(library, behaviour, residual=1e-7)

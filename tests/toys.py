@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from kumite.annotate import Contacts, Strikes
 from kumite.clip import Clip, ClipSet, Skeleton, concatenate
+from kumite.graph import ActionTable, Library
 from kumite.rotation import from_yaw
 
 _BONES = (
@@ -70,3 +72,15 @@ def still(frames: int, *, name: str = "still", fps: float = 30.0, yaw: float = 0
 
 def clip_set(lengths: list[int], fps: float = 30.0) -> ClipSet:
     return concatenate([still(n, name=f"clip{i}", fps=fps) for i, n in enumerate(lengths)])
+
+
+def library(table: ActionTable, frames: int, tips: dict[int, tuple] | None = None) -> Library:
+    """A library whose body stands still; tips: frame -> (place [3], speed) of left-hand hits."""
+    clips = clip_set([frames])
+    effective = np.zeros((frames, 4), bool)
+    tip, speed = np.zeros((frames, 4, 3)), np.zeros((frames, 4))
+    for f, (place, v) in (tips or {}).items():
+        effective[f, 0], tip[f, 0], speed[f, 0] = True, place, v
+    empty = np.zeros(0, np.int32)
+    strikes = Strikes(effective, tip, speed, empty, empty, empty, empty, np.zeros((0, 3)))
+    return Library(clips, Contacts(np.ones((frames, 2), bool), np.zeros((2, 2))), strikes, table)

@@ -148,6 +148,106 @@ def _backups(folder: Path) -> float:
     return backups / _best(lambda: _solve(folder, "strike"))
 
 
+STREAM_WORDS = 1 << 23  # 3 arrays of 64 MiB: no cache holds them
+
+
+@cache
+def _stream() -> float:
+    """Bytes/s of STREAM's triad: two arrays read, one written (McCalpin's count)."""
+    from kumite.kernels.stream import triad
+
+    a, b, c = np.zeros(STREAM_WORDS), np.ones(STREAM_WORDS), np.ones(STREAM_WORDS)
+    return 3 * a.nbytes / _best(lambda: triad(a, b, c, 3.0))
+
+
+@_figure("STREAM triad", "GB/s")
+def _triad(folder: Path) -> float:
+    return _stream() / 1e9
+
+
+@_figure("share of STREAM that Bellman backups reach", "share")
+def _share_of_stream(folder: Path) -> float:
+    """Bytes that a sweep's two kernels ask for, over the time they take, over STREAM's.
+
+    ``back_up_stretches`` goes once through index and weight [L, M, W], reward and Q [L, M], and the
+    values [L, M] of the states stretches end in. ``best_actions`` reads a line of Q [M] an action
+    and goes through values [N, M] and its copy of them, old and new. Lines of Q (0.6 MB in all)
+    and values come again from cache, so the share may be above 1: it would take that much bandwidth
+    if they did not.
+    """
+    from kumite.control import strike
+    from kumite.control.policy import stretch_rewards, stretch_tracks
+    from kumite.kernels import policy as kernels
+
+    library = _library(folder)
+    behaviour, table = strike(library), library.table
+    points = behaviour.grid.points
+    reward = stretch_rewards(behaviour, stretch_tracks(library), library.clips.fps)
+    index = np.empty((*reward.shape, 8), dtype=np.int32)
+    weight = np.empty(index.shape, dtype=np.float32)
+    kernels.successor_corners(
+        table.displacement, points, *behaviour.grid.kernel_arguments(), index, weight
+    )
+    factor = np.full(len(reward), 0.5, dtype=np.float32)
+    value, q = np.zeros((table.states, len(points)), np.float32), np.empty_like(reward)
+    change = np.empty(table.states, dtype=np.float32)
+
+    def sweep() -> None:
+        kernels.back_up_stretches(reward, factor, table.target, index, weight, value, q)
+        kernels.best_actions(table.action_start, table.stretch, q, value, change)
+
+    stretches = index.nbytes + weight.nbytes + 2 * reward.nbytes + q.nbytes
+    actions = table.actions * len(points) * q.itemsize + 4 * value.nbytes
+    return (stretches + actions) / _best(sweep) / _stream()
+
+
+def _skill(folder: Path):
+    from kumite.control import Skill, stretch_tracks
+
+    library = _library(folder)
+    near, hit = _solve(folder, "approach"), _solve(folder, "strike")
+    return Skill(library, near, hit, stretch_tracks(library))
+
+
+def _over_best_path(folder: Path, aim: str, count: int, few: int = 1) -> float:
+    from kumite.control.worth import around, ratios, time_to_target
+
+    skill = _skill(folder)
+    return ratios(time_to_target(skill, around(skill, count, 0), aim, few=few)).median
+
+
+@_figure("time to reach over the best path's, median", "ratio", 1.15)
+def _reach(folder: Path) -> float:
+    return _over_best_path(folder, "reach", 60)
+
+
+@_figure("time to hit over the best path's, median", "ratio", 1.15)
+def _hit(folder: Path) -> float:
+    return _over_best_path(folder, "hit", 40)
+
+
+@_figure("time to hit over the best path's, median, two steps ahead", "ratio", 1.15)
+def _hit_further(folder: Path) -> float:
+    return _over_best_path(folder, "hit", 40, few=4)
+
+
+@cache
+def _covered(folder: Path):
+    from kumite.control.worth import coverage
+
+    return coverage(_skill(folder), 200)
+
+
+@_figure("targets hit within 2 s, share", "share")
+def _hit_soon(folder: Path) -> float:
+    return _covered(folder).policy
+
+
+@_figure("targets hit within 2 s on the best path, share", "share")
+def _hit_soon_at_best(folder: Path) -> float:
+    return _covered(folder).best
+
+
 def _sparring(folder: Path):
     from kumite.scene import LiveScene, load_scene
 

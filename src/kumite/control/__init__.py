@@ -15,6 +15,7 @@ from kumite.control.policy import (
     strike,
 )
 from kumite.control.trained import cache_folder, trained
+from kumite.control.worth import Worth, measure_worth
 
 __all__ = [
     "BEHAVIOURS",
@@ -25,11 +26,13 @@ __all__ = [
     "Station",
     "TargetGrid",
     "Temper",
+    "Worth",
     "approach",
     "approach_grid",
     "cache_folder",
     "circle",
     "keep_off",
+    "measure_worth",
     "solve",
     "stretch_tracks",
     "strike",

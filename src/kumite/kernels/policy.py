@@ -327,6 +327,20 @@ def reward_now(k, kind, params, discount, target, sx, sz, moves):
 
 
 @kernel
+def off_the_rim(behaviours, b, x, z):
+    """The share of the way to a target (x, z) that lies beyond behaviour b's grid.
+
+    A target out of the grid is looked at as if it stood on its rim: each action brings it nearer.
+    (Were the place after the action clamped instead, no way of getting there would be better than
+    another.)
+    """
+    if behaviours.inside_only[b]:
+        return 0.0
+    rim = behaviours.low[b, 1] + behaviours.step[b, 1] * (behaviours.size[b, 1] - 1)
+    return max(0.0, 1.0 - rim / max(np.hypot(x, z), 1e-9))
+
+
+@kernel
 def look_ahead(state, target, others, moves, behaviours, weights, facing, worth, gap):
     """One step of Eq. 4 at run time, exact in the continuous target, for every action of a state.
 
@@ -346,13 +360,7 @@ def look_ahead(state, target, others, moves, behaviours, weights, facing, worth,
     for b in range(behaviours.kind.shape[0]):
         if weights[b] == 0.0 or not behaviours.active[b, 0] <= away <= behaviours.active[b, 1]:
             continue
-        # A target out of the grid is looked at as if it stood on its rim: each action brings it
-        # nearer. (Were the place after the action clamped instead, no way of getting there would
-        # be better than another.)
-        share = 0.0
-        if not behaviours.inside_only[b]:
-            rim = behaviours.low[b, 1] + behaviours.step[b, 1] * (behaviours.size[b, 1] - 1)
-            share = max(0.0, 1.0 - rim / max(away, 1e-9))
+        share = off_the_rim(behaviours, b, target[0, 0], target[0, 2])
         sx, sz = share * target[0, 0], share * target[0, 2]
         for n in range(end - begin):
             k = moves.stretch[begin + n]
