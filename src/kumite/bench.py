@@ -267,6 +267,41 @@ def _run(folder: Path) -> float:
     return SPARRING_SECONDS / _best(work)
 
 
+def _crowd(folder: Path, count: int):
+    from kumite.scene import LiveScene, load_scene, with_count
+
+    scene = LiveScene(with_count(load_scene("crowd"), count), _library(folder))
+    for _ in range(round(scene.fps)):  # a second in which they come to blows
+        scene.step()
+    return scene
+
+
+def _frames(folder: Path, count: int, frames: int) -> float:
+    """Seconds that frames of a crowd take."""
+    scene = _crowd(folder, count)
+
+    def work() -> None:
+        for _ in range(frames):
+            scene.step()
+
+    return _best(work)
+
+
+@_figure("crowd: 30 boxers x 1,000 frames", "s", 0.25)
+def _thirty(folder: Path) -> float:
+    return _frames(folder, 30, 1000)
+
+
+@_figure("crowd: 1,000 boxers", "× real time", 1.0)
+def _thousand(folder: Path) -> float:
+    return 60 / _library(folder).clips.fps / _frames(folder, 1000, 60)
+
+
+@_figure("crowd: cost of an avatar-frame of 10,000 over that of 30", "ratio")
+def _flat(folder: Path) -> float:
+    return (_frames(folder, 10_000, 12) / (12 * 10_000)) / (_frames(folder, 30, 300) / (300 * 30))
+
+
 @cache
 def _fights(folder: Path):
     from kumite.scene import measure, record

@@ -15,7 +15,7 @@ from kumite.kernels import crowd as kernels
 from kumite.kernels import policy as kernels_policy
 from kumite.kernels.policy import Behaviours, Moves
 
-MANY = 8  # characters that choose at once (1 ms of work) from which threads pay
+MANY = 16  # characters that choose at once (2 ms of work) from which threads pay
 
 
 @dataclass
@@ -85,6 +85,7 @@ class Skill:
             table.stretch,
             table.target,
             table.displacement,
+            np.stack([np.sin(table.displacement[:, 2]), np.cos(table.displacement[:, 2])], axis=1),
             table.duration,
             tracks.centre_start,
             tracks.centre,
@@ -107,10 +108,12 @@ class Skill:
         grids = [p.grid_arguments for p in self.policies]
         kinds = {"approach": kernels_policy.APPROACH, "strike": kernels_policy.STRIKE}
         sizes = [p.value.size for p in self.policies]
+        discount = np.array([frame_discount(b, fps) for b in every])
         return Behaviours(
             np.array([kernels_policy.STATION if b.station else kinds[b.name] for b in every]),
             np.stack([reward_params(b, fps) for b in every]),
-            np.array([frame_discount(b, fps) for b in every]),
+            discount,
+            discount[:, None] ** np.arange(int(self.library.table.duration.max()) + 1),
             np.array([(b.nearest, b.farthest) for b in every]),
             np.concatenate([p.value.ravel() for p in self.policies]),
             np.concatenate([[0], np.cumsum(sizes)]),

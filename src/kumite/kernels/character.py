@@ -17,7 +17,7 @@ import numpy as np
 from numba import prange
 
 from kumite.kernels.jit import kernel, parallel_kernel
-from kumite.kernels.pose import add_rotated, forward_kinematics_frame, quaternion_product
+from kumite.kernels.pose import add_rotated, quaternion_product
 
 TINY = 1e-12
 LN2 = 0.6931471805599453
@@ -227,6 +227,17 @@ def join(k, frame_from, frame_to, anchor, capture, offsets):
 
 
 @kernel
+def product(aw, ax, ay, az, bw, bx, by, bz):
+    """Hamilton product of two quaternions, in scalars: no array is made for it."""
+    return (
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+    )
+
+
+@kernel
 def turn_joint(joint, parents, delta, wxyz, world_wxyz):
     """Turn a joint by a rotation given in world axes; only its local rotation is changed."""
     turned, inverse = np.empty(4), np.empty(4)
@@ -253,15 +264,28 @@ def arc(a, b, out):
 
 
 @kernel
+def pose_joint(j, parents, offsets, wxyz, position, world):
+    """Position and world rotation of a joint below the root, whose parent's are up to date."""
+    p = parents[j]
+    pw, px, py, pz = world[p, 0], world[p, 1], world[p, 2], world[p, 3]
+    x, y, z = offsets[j, 0], offsets[j, 1], offsets[j, 2]
+    # v + 2 w (u x v) + 2 u x (u x v)
+    tx, ty, tz = 2.0 * (py * z - pz * y), 2.0 * (pz * x - px * z), 2.0 * (px * y - py * x)
+    position[j, 0] = position[p, 0] + x + pw * tx + py * tz - pz * ty
+    position[j, 1] = position[p, 1] + y + pw * ty + pz * tx - px * tz
+    position[j, 2] = position[p, 2] + z + pw * tz + px * ty - py * tx
+    world[j, 0], world[j, 1], world[j, 2], world[j, 3] = product(
+        pw, px, py, pz, wxyz[j, 0], wxyz[j, 1], wxyz[j, 2], wxyz[j, 3]
+    )
+
+
+@kernel
 def pose_below(below, parents, offsets, wxyz, position, world_wxyz):
     """Positions and world rotations of the joints of a limb, whose parents' are up to date."""
     for i in range(below.shape[0]):
-        j = below[i]
-        if j < 0:
+        if below[i] < 0:
             break
-        p = parents[j]
-        add_rotated(world_wxyz[p], offsets[j], position[p], position[j])
-        quaternion_product(world_wxyz[p], wxyz[j], world_wxyz[j])
+        pose_joint(below[i], parents, offsets, wxyz, position, world_wxyz)
 
 
 @kernel
@@ -324,11 +348,25 @@ def move_feet(foot_offset, foot_velocity, planted, half_life, longest, dt):
 
 
 @kernel
+def turned_by(x, y, z):
+    """Quaternion of a rotation vector, in scalars."""
+    a2 = x * x + y * y + z * z
+    if a2 < 1e-3:  # the series is exact to a rounding there
+        w = 1.0 - a2 * (0.125 - a2 * (1.0 / 384.0 - a2 / 46080.0))
+        s = 0.5 - a2 * (1.0 / 48.0 - a2 * (1.0 / 3840.0 - a2 / 645120.0))
+    else:
+        angle = np.sqrt(a2)
+        w = np.cos(0.5 * angle)
+        s = np.sin(0.5 * angle) / angle
+    return w, s * x, s * y, s * z
+
+
+@kernel
 def show_one(k, frame, anchor, dt, springs, capture, build, offsets, poses):
     """One frame of character k of :func:`show`."""
     f = frame[k]
     root_position, wxyz = poses.root_position[k], poses.wxyz[k]
-    position, world_wxyz = poses.position[k], poses.world_wxyz[k]
+    position, world = poses.position[k], poses.world_wxyz[k]
     spring(offsets.root[k], offsets.root_velocity[k], springs.root, dt)
     move_feet(
         offsets.foot[k],
@@ -338,29 +376,41 @@ def show_one(k, frame, anchor, dt, springs, capture, build, offsets, poses):
         springs.longest_foot_offset,
         dt,
     )
-    turn, held, pushed, base = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
+    held, held_velocity = offsets.joint[k], offsets.joint_velocity[k]
+    pushed, pushed_velocity = offsets.reaction[k], offsets.reaction_velocity[k]
     quick, slow = 2.0 * LN2 / springs.joint, 2.0 * LN2 / springs.reaction
     left_quick, left_slow = np.exp(-quick * dt), np.exp(-slow * dt)
-    for j in range(wxyz.shape[0]):
-        decay(offsets.joint[k, j], offsets.joint_velocity[k, j], quick, left_quick, dt)
-        struck = np.any(offsets.reaction_velocity[k, j] != 0.0)
-        if struck:
-            decay(offsets.reaction[k, j], offsets.reaction_velocity[k, j], slow, left_slow, dt)
-        if j == 0:
-            anchored_root(anchor[k], capture.root[f], capture.wxyz[f, 0], root_position, base)
-        else:
-            base[:] = capture.wxyz[f, j]
-        exponential(offsets.joint[k, j], held)
-        if struck:
-            exponential(offsets.reaction[k, j], pushed)
-            quaternion_product(held, pushed, turn)
-            quaternion_product(base, turn, wxyz[j])
-        else:
-            quaternion_product(base, held, wxyz[j])
+    root_wxyz = np.empty(4)
+    anchored_root(anchor[k], capture.root[f], capture.wxyz[f, 0], root_position, root_wxyz)
     for c in range(3):
         root_position[c] += offsets.root[k, c]
     parents, bones = build.parents, build.offsets
-    forward_kinematics_frame(parents, bones, root_position, wxyz, position, world_wxyz)
+    for j in range(wxyz.shape[0]):
+        struck = False
+        for c in range(3):
+            change = held_velocity[j, c] + held[j, c] * quick
+            held[j, c] = left_quick * (held[j, c] + change * dt)
+            held_velocity[j, c] = left_quick * (held_velocity[j, c] - change * quick * dt)
+            struck = struck or pushed_velocity[j, c] != 0.0
+        w, x, y, z = turned_by(held[j, 0], held[j, 1], held[j, 2])
+        if struck:
+            for c in range(3):
+                change = pushed_velocity[j, c] + pushed[j, c] * slow
+                pushed[j, c] = left_slow * (pushed[j, c] + change * dt)
+                pushed_velocity[j, c] = left_slow * (pushed_velocity[j, c] - change * slow * dt)
+            a, b, c_, d = turned_by(pushed[j, 0], pushed[j, 1], pushed[j, 2])
+            w, x, y, z = product(w, x, y, z, a, b, c_, d)
+        if j == 0:
+            w, x, y, z = product(root_wxyz[0], root_wxyz[1], root_wxyz[2], root_wxyz[3], w, x, y, z)
+            wxyz[0, 0], wxyz[0, 1], wxyz[0, 2], wxyz[0, 3] = w, x, y, z
+            world[0, 0], world[0, 1], world[0, 2], world[0, 3] = w, x, y, z
+            for c in range(3):
+                position[0, c] = root_position[c]
+            continue
+        q = capture.wxyz
+        w, x, y, z = product(q[f, j, 0], q[f, j, 1], q[f, j, 2], q[f, j, 3], w, x, y, z)
+        wxyz[j, 0], wxyz[j, 1], wxyz[j, 2], wxyz[j, 3] = w, x, y, z
+        pose_joint(j, parents, bones, wxyz, position, world)
     goal = np.empty(3)
     for s in range(2):
         x, z = planar_point(anchor[k], capture.ankle[f, s, 0], capture.ankle[f, s, 2])
@@ -368,7 +418,7 @@ def show_one(k, frame, anchor, dt, springs, capture, build, offsets, poses):
         goal[1] = capture.ankle[f, s, 1] + offsets.foot[k, s, 1]
         goal[2] = z + offsets.foot[k, s, 2]
         thigh, shin, foot = build.legs[s, 0], build.legs[s, 1], build.legs[s, 2]
-        reach(thigh, shin, foot, build.below[s], goal, parents, bones, wxyz, position, world_wxyz)
+        reach(thigh, shin, foot, build.below[s], goal, parents, bones, wxyz, position, world)
 
 
 @kernel

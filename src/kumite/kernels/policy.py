@@ -192,6 +192,7 @@ class Moves(NamedTuple):
     stretch: np.ndarray  # [A]
     successor: np.ndarray  # [L]
     displacement: np.ndarray  # [L, 3]
+    turn: np.ndarray  # [L, 2] sine and cosine of the displacement's yaw
     duration: np.ndarray  # [L] frames
     start: np.ndarray  # [L + 1] first row of each stretch in centre and root
     centre: np.ndarray  # [T, 2] m, where blows land, on the ground
@@ -208,6 +209,7 @@ class Behaviours(NamedTuple):
     kind: np.ndarray  # [Z] APPROACH, STRIKE or STATION
     params: np.ndarray  # [Z, 7]: see Station's columns; σ of approaching, tolerance of striking
     discount: np.ndarray  # [Z] per frame
+    fade: np.ndarray  # [Z, T] its powers, from 0 to the longest duration
     active: np.ndarray  # [Z, 2] m, nearest and farthest target for which it counts
     value: np.ndarray  # flat float32, one behaviour after the other: [N, M of it]
     start: np.ndarray  # [Z + 1]
@@ -297,7 +299,7 @@ def reward_now(k, kind, params, discount, target, sx, sz, moves):
     """R of stretch k for a target [H, 3], foreseen and moved by (-sx, -sz)."""
     horizon = target.shape[0] - 1
     first, last = moves.start[k], moves.start[k + 1]
-    best, factor = 0.0, 1.0
+    best = 0.0
     if kind == STATION:
         part = slice(first, last)
         return station_reward(
@@ -311,19 +313,17 @@ def reward_now(k, kind, params, discount, target, sx, sz, moves):
             if dx * dx + dy * dy + dz * dz <= params[SIGMA] * params[SIGMA]:
                 best = max(best, discount ** moves.tip_when[p] * moves.tip_weight[p])
         return best
-    nearest = np.inf
+    # The largest of γ^t exp(-d/σ), found by its logarithm: one exponential instead of many.
+    most, passed, fall = -np.inf, 0.0, np.log(discount)
     for t in range(last - first):
-        factor *= discount
-        if factor <= best:
-            break
+        passed += fall
+        if passed <= most:
+            break  # even a perfect place could not beat it any more
         h = min(t, horizon)
         dx = moves.centre[first + t, 0] - target[h, 0] + sx
         dz = moves.centre[first + t, 1] - target[h, 2] + sz
-        d2 = dx * dx + dz * dz
-        if d2 < nearest:  # later and farther off is never better
-            nearest = d2
-            best = max(best, factor * np.exp(-np.sqrt(d2) / params[SIGMA]))
-    return best
+        most = max(most, passed - np.sqrt(dx * dx + dz * dz) / params[SIGMA])
+    return np.exp(most)
 
 
 @kernel
@@ -375,10 +375,12 @@ def look_ahead(state, target, others, moves, behaviours, weights, facing, worth,
                 moves,
             )
             h = min(moves.duration[k], horizon + 1) - 1
-            x, z = carry(moves.displacement[k], target[h, 0] - sx, target[h, 2] - sz)
-            y = target[h, 1]
+            dx = target[h, 0] - sx - moves.displacement[k, 0]
+            dz = target[h, 2] - sz - moves.displacement[k, 1]
+            s, c = moves.turn[k, 0], moves.turn[k, 1]
+            x, y, z = c * dx - s * dz, target[h, 1], s * dx + c * dz
             later = worth_later(behaviours, b, moves.successor[k], x, y, z, index, weight)
-            worth[n] += weights[b] * (now + behaviours.discount[b] ** moves.duration[k] * later)
+            worth[n] += weights[b] * (now + behaviours.fade[b, moves.duration[k]] * later)
     for n in range(end - begin):
         k = moves.stretch[begin + n]
         first, last = moves.start[k], moves.start[k + 1]
