@@ -15,17 +15,15 @@ import kumite
 TIP = """
 import numpy as np
 from kumite.kernels import character
-position, turn = np.zeros((2, 3)), np.array([[1.0, 0, 0, 0], [1.0, 0, 0, 0]])
-bones = np.array([[0.0, 0, 0], [1.0, 2.0, 3.0]])
-parents = np.array([-1, 0])
-character.pose_below(np.array([1, -1]), parents, bones, turn, position, turn.copy())
-print(position[1, 0])
+wxyz = np.array([[1.0, 0, 0, 0]])
+character.turn_joint(0, np.array([-1]), np.array([1.0, 0, 0, 0]), wxyz, wxyz.copy())
+print(wxyz[0, 0])
 """
 
 
 @pytest.mark.slow
 def test_compiled_code_is_not_kept_when_a_kernel_that_it_calls_changes(tmp_path: Path):
-    """``character.pose_below`` calls ``pose.add_rotated``, which lives in another file."""
+    """``character.turn_joint`` calls ``pose.quaternion_product``, which lives in another file."""
     package = tmp_path / "kumite"
     shutil.copytree(
         Path(kumite.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__")
@@ -48,5 +46,5 @@ def test_compiled_code_is_not_kept_when_a_kernel_that_it_calls_changes(tmp_path:
     assert run() == 1.0 and sorted((tmp_path / "cache").rglob("*.nbc")) == kept
     pose = package / "kernels" / "pose.py"
     text = pose.read_text("utf-8")
-    pose.write_text(text.replace("out[0] = base[0] + v[0]", "out[0] = 10.0 + base[0] + v[0]"))
+    pose.write_text(text.replace("out[0] = a[0] * b[0]", "out[0] = 10.0 + a[0] * b[0]"))
     assert run() == 11.0
