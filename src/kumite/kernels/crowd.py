@@ -14,7 +14,7 @@ from numba import prange
 from kumite.kernels.blow import NO_BLOW, NO_HIT, NOBODY, swept_contact
 from kumite.kernels.character import planar_point
 from kumite.kernels.jit import kernel, parallel_kernel
-from kumite.kernels.policy import look_ahead
+from kumite.kernels.policy import carry, look_ahead
 from kumite.kernels.pose import add_rotated
 
 NEIGHBOURS = 6  # bodies that a character minds, its opponent among them
@@ -141,30 +141,22 @@ def draw(seed, k, n):
 
 
 @kernel
-def seen_from(here, x, z):
-    """A point of the ground in the planar frame ``here``."""
-    dx, dz = x - here[0], z - here[1]
-    c, s = np.cos(here[2]), np.sin(here[2])
-    return c * dx - s * dz, s * dx + c * dz
-
-
-@kernel
 def foresee(k, here, actors, target, other):
     """Where k's target [H, 3] and its body [H, 2] are expected, seen from ``here``."""
     o = actors.opponent[k]
     for h in range(target.shape[0]):
         if o == NOBODY:
             thing = actors.things[actors.thing[k]]
-            target[h, 0], target[h, 2] = seen_from(here, thing[0], thing[2])
+            target[h, 0], target[h, 2] = carry(here, thing[0], thing[2])
             target[h, 1] = thing[1]
             other[h, 0] = other[h, 1] = FAR  # a thing may be stood under
             continue
         f = min(actors.frame[o] + h + 1, actors.stop[o])
         x, z = planar_point(actors.anchor[o], actors.aim[f, 0], actors.aim[f, 2])
-        target[h, 0], target[h, 2] = seen_from(here, x, z)
+        target[h, 0], target[h, 2] = carry(here, x, z)
         target[h, 1] = actors.aim[f, 1]
         x, z = planar_point(actors.anchor[o], actors.root[f, 0], actors.root[f, 2])
-        other[h, 0], other[h, 1] = seen_from(here, x, z)
+        other[h, 0], other[h, 1] = carry(here, x, z)
 
 
 @kernel
@@ -190,7 +182,7 @@ def decide_one(k, state, place, grid, actors, minds, moves, behaviours, horizon,
             for h in range(horizon):
                 g = min(actors.frame[j] + h + 1, actors.stop[j])
                 x, z = planar_point(actors.anchor[j], actors.root[g, 0], actors.root[g, 2])
-                others[count, h, 0], others[count, h, 1] = seen_from(here, x, z)
+                others[count, h, 0], others[count, h, 1] = carry(here, x, z)
             count += 1
     pick(k, state, target, others[:count], minds, moves, behaviours, choices)
 
