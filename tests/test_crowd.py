@@ -106,6 +106,21 @@ def test_many_deciding_at_once_decide_as_one_after_the_other(library: Library):
     assert frames[0][1].tobytes() == frames[1][1].tobytes()
 
 
+def test_one_who_aims_at_the_nearest_among_named_ones_aims_at_another(library: Library):
+    characters = [
+        {"name": "a", "position": (0, 0), "aims_at": "b"},
+        {"name": "b", "position": (0, 1.2), "aims_at": "a"},
+        {"name": "third", "position": (0, 2.6), "aims_at": "nearest"},
+    ]
+    scene = LiveScene(
+        SceneSettings.model_validate({"title": "three", "character": characters}), library, seed=0
+    )
+    assert scene._actors.opponent.tolist() == [1, 0, 1]
+    for _ in range(int(10 * scene.fps)):
+        scene.step()
+    assert any(e.kind == "strike" and e.character == "third" for e in scene.events)
+
+
 def test_bodies_of_different_pairs_keep_apart(library: Library):
     """Two pairs put into each other: the other pair is minded too, not the opponent alone."""
     corners = [(0.0, -0.6), (0.0, 0.6), (0.35, -0.6), (0.35, 0.6)]

@@ -169,7 +169,7 @@ def _arm(
     sign = 1.0 - 2.0 * s
     out = np.array([sign, 0.0, 0.0])
     chest = t.turned["Chest"]
-    collar = np.array(COLLARS[s][0])
+    collar, to_shoulder = COLLARS[s]
     fist = rotate(conjugate(chest), hand - t.at["Chest"]) - collar
     # The collarbone follows the fist a little: a reaching shoulder comes forward.
     ahead = np.clip(fist[:, 2] - 0.25, 0.0, 0.5)
@@ -178,7 +178,7 @@ def _arm(
         from_axis_angle(np.array([0.0, 1.0, 0.0]), -sign * 0.55 * ahead),
         from_axis_angle(np.array([0.0, 0.0, 1.0]), sign * 0.35 * rise),
     )
-    shoulder = collar + rotate(clavicle, np.array(COLLARS[s][1]))
+    shoulder = collar + rotate(clavicle, to_shoulder)
     goal = fist + collar
     pole = swivelled(
         goal - shoulder,

@@ -13,12 +13,6 @@ THIGH, SHIN = 0.435, 0.43  # m
 UPPER_ARM, FOREARM = 0.285, 0.255
 BALL = np.array([0.0, -0.062, 0.125])  # from the ankle to the ball of the foot, foot flat
 BALL_HEIGHT = 0.026  # of the ball's joint above the ground, foot flat
-COLLARS = tuple(
-    (np.array([0.03 * sign, 0.195, 0.0]), np.array([0.15 * sign, 0.0, -0.01]))
-    for sign in (1.0, -1.0)
-)
-"""Of the left and the right arm: collarbone from the chest, shoulder from the collarbone."""
-HIPS = (np.array([0.09, -0.06, 0.0]), np.array([-0.09, -0.06, 0.0]))  # from the pelvis
 BLADE = np.array([-np.sin(np.radians(40)), 0.0, np.cos(np.radians(40))])
 """A sword's direction in the right hand's axes: across the palm, a little forward."""
 SWORD = 0.92  # m from the grip to the point
@@ -46,6 +40,10 @@ BONES: tuple[tuple[str, str | None, tuple[float, float, float], str | None], ...
     ("RightFoot", "RightLeg", (0.0, -SHIN, 0.0), "right_foot"),
     ("RightToes", "RightFoot", tuple(BALL.tolist()), "right_toe"),
 )
+_OFFSETS = {name: np.array(offset) for name, _, offset, _ in BONES}
+COLLARS = tuple((_OFFSETS[f"{s}Shoulder"], _OFFSETS[f"{s}Arm"]) for s in ("Left", "Right"))
+"""Of the left and the right arm: collarbone from the chest, shoulder from the collarbone."""
+HIPS = (_OFFSETS["LeftUpLeg"], _OFFSETS["RightUpLeg"])  # from the pelvis
 _TIPS = {
     "Head": (0.0, 0.19, 0.015),
     "LeftHand": (0.115, 0.0, 0.0),

@@ -57,7 +57,7 @@ def vary(move: Move, style: Style, rng: np.random.Generator) -> Performed:
     drift = rng.normal(0, stray, 2) if move.steps else np.zeros(2)
     swing = rng.normal(0, 4.0) if move.steps else 0.0
     if move.kind == "attack" and move.steps:
-        # On the spot half of the time, else with a step that turns to the target or closes in.
+        # On the spot two times in five, else with a step that turns to the target or closes in.
         stepping = rng.random() < 0.6
         z += stepping * rng.uniform(*style.blow_step)
         swing += stepping * rng.uniform(-1, 1) * style.blow_turn

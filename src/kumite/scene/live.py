@@ -255,10 +255,14 @@ class LiveScene:
                 opponent[k] = number[c.aims_at]
             else:
                 thing[k] = objects.index(c.aims_at)
-        if free:
+        ground = self.cast.root_position[:, [0, 2]]
+        if len(free) == 1:  # the others are named: the nearest of them, whoever they aim at
+            away = np.hypot(*(ground - ground[free[0]]).T)
+            away[free[0]] = np.inf
+            opponent[free[0]] = np.argmin(away)
+        elif free:
             who = np.array(free)
-            ground = self.cast.root_position[who][:, [0, 2]]
-            opponent[who] = who[pair_up(ground, np.searchsorted(who, opponent[who]))]
+            opponent[who] = who[pair_up(ground[who], np.searchsorted(who, opponent[who]))]
 
     @property
     def root_position(self) -> np.ndarray:

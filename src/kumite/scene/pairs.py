@@ -14,13 +14,10 @@ def pair_up(ground: np.ndarray, partner: np.ndarray) -> np.ndarray:
 
     partner [K]: the ones they had, or numbers outside 0..K-1. Pairs that are near each other stay.
     The others pair up greedily, the nearest two first (of equal distances those with the lower
-    numbers); whoever is left over aims at the nearest of all, paired or not. One alone aims at
-    itself, which is nobody.
+    numbers); whoever is left over aims at the nearest of all, paired or not. At least two.
     """
     count = len(ground)
     out = np.full(count, -1)
-    if count < 2:
-        return np.zeros(count, dtype=np.int64)
     for k in range(count):
         j = int(partner[k])
         mutual = 0 <= j < count and j != k and partner[j] == k
