@@ -10,18 +10,19 @@ from hypothesis import strategies as st
 from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.kernels import crowd as kernels
-from kumite.scene import LiveScene, SceneSettings, load_scene, measure, record, with_count
+from kumite.kernels import near
+from kumite.scene import LiveScene, SceneSettings, live, load_scene, measure, record, with_count
 from kumite.scene import memory as memory_module
 from kumite.scene.pairs import pair_up
 
 
-def _hash(place: np.ndarray) -> kernels.Hash:
+def _hash(place: np.ndarray) -> near.Hash:
     count = len(place)
     buckets = 1 << max(3, int(2 * count - 1).bit_length())
-    grid = kernels.Hash(
+    grid = near.Hash(
         np.zeros(buckets + 1, np.int32), np.zeros(count, np.int32), np.zeros((count, 2), np.int32)
     )
-    kernels.fill_hash(place, grid)
+    near.fill_hash(place, grid)
     return grid
 
 
@@ -35,7 +36,7 @@ def test_neighbours_are_those_of_brute_force(seed, count, spread):
     assert sorted(grid.item.tolist()) == list(range(count))
     for k in range(count):
         found = np.empty(4, dtype=np.int64)
-        n = kernels.nearest(k, place, 2.0, grid, found)
+        n = near.nearest(k, place, 2.0, grid, found)
         gap = np.hypot(*(place[:, [0, 2]] - place[k, [0, 2]]).T)
         others = [j for j in np.lexsort((np.arange(count), gap)) if j != k and gap[j] <= 2.0]
         assert found[:n].tolist() == others[:4]
@@ -87,21 +88,15 @@ def test_thirty_boxers_fight_each_with_the_nearest(library: Library):
     assert min(c.joins for c in found.characters) >= 3
 
 
-def test_many_deciding_at_once_decide_as_one_after_the_other(library: Library):
+def test_many_at_once_are_as_one_after_the_other(library: Library, monkeypatch: pytest.MonkeyPatch):
     """The kernel on all cores gives the bytes of the one that is not."""
-    from kumite.control import fighter
-
     frames = []
-    kept = fighter.MANY
-    try:
-        for many in (2, 10**6):
-            fighter.MANY = many
-            scene = LiveScene(with_count(load_scene("crowd"), 40), library, seed=3)
-            for _ in range(90):
-                scene.step()
-            frames.append((scene.cast.frame.copy(), scene.wxyz.copy()))
-    finally:
-        fighter.MANY = kept
+    for many in (2, 10**6):
+        monkeypatch.setattr(live, "MANY", many)
+        scene = LiveScene(with_count(load_scene("crowd"), 40), library, seed=3)
+        for _ in range(90):
+            scene.step()
+        frames.append((scene.cast.frame.copy(), scene.wxyz.copy()))
     assert np.array_equal(frames[0][0], frames[1][0])
     assert frames[0][1].tobytes() == frames[1][1].tobytes()
 

@@ -15,15 +15,15 @@ import kumite
 TIP = """
 import numpy as np
 from kumite.kernels import character
-wxyz = np.array([[1.0, 0, 0, 0]])
-character.turn_joint(0, np.array([-1]), np.array([1.0, 0, 0, 0]), wxyz, wxyz.copy())
-print(wxyz[0, 0])
+one, quarter, out = np.array([1.0, 0, 0, 0]), np.sqrt([0.5, 0.5, 0, 0]), np.zeros(3)
+character.difference(one, quarter, out)
+print(round(out[0] / np.pi, 6))
 """
 
 
 @pytest.mark.slow
 def test_compiled_code_is_not_kept_when_a_kernel_that_it_calls_changes(tmp_path: Path):
-    """``character.turn_joint`` calls ``pose.quaternion_product``, which lives in another file."""
+    """``character.difference`` calls ``pose.quaternion_product``, which lives in another file."""
     package = tmp_path / "kumite"
     shutil.copytree(
         Path(kumite.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__")
@@ -41,10 +41,10 @@ def test_compiled_code_is_not_kept_when_a_kernel_that_it_calls_changes(tmp_path:
         )
         return float(done.stdout)
 
-    assert run() == 1.0
+    assert run() == 0.5
     kept = sorted((tmp_path / "cache").rglob("*.nbc"))
-    assert run() == 1.0 and sorted((tmp_path / "cache").rglob("*.nbc")) == kept
+    assert run() == 0.5 and sorted((tmp_path / "cache").rglob("*.nbc")) == kept
     pose = package / "kernels" / "pose.py"
     text = pose.read_text("utf-8")
-    pose.write_text(text.replace("out[0] = a[0] * b[0]", "out[0] = 10.0 + a[0] * b[0]"))
-    assert run() == 11.0
+    pose.write_text(text.replace("out[0] = a[0] * b[0] -", "out[0] = -a[0] * b[0] -"))
+    assert run() == -0.5

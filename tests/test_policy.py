@@ -29,6 +29,7 @@ from kumite.control import (
 from kumite.control.policy import frame_discount, stretch_rewards
 from kumite.errors import KumiteError
 from kumite.graph import ActionTable, Library
+from kumite.kernels import look_ahead as look
 from kumite.kernels import policy as kernels
 from tests import reference, toys
 
@@ -120,11 +121,39 @@ def test_values_satisfy_equation_4_within_the_residual(library: Library):
         assert solved.converged and gap <= 1e-5
 
 
-def interpolated(value: np.ndarray, grid: TargetGrid, point) -> float:
-    low, step, size, wraps, inside = grid.kernel_arguments()
+def interpolated(value: np.ndarray, grid: TargetGrid, point) -> tuple[float, float]:
+    """By the corners that backups use, and as fighters look it up."""
     x, y, z = point
+    low, step, size, wraps, inside = grid.kernel_arguments()
     index, weight = np.zeros(8, np.int64), np.zeros(8)
-    return kernels.interpolate(value, x, y, z, low, step, size, wraps, inside, index, weight)
+    count = kernels.corners(x, y, z, low, step, size, wraps, inside, index, weight)
+    by_corners = sum(weight[c] * value[index[c]] for c in range(count))
+
+    nothing, ones = np.zeros((1, 9)), np.ones(1)
+    behaviours = look.Behaviours(
+        np.zeros(1, np.int64),
+        nothing,
+        ones,
+        ones[None],
+        nothing[:, :2],
+        value,
+        np.array([0, len(grid)]),
+        np.array([len(grid)]),
+        low[None],
+        step[None],
+        size[None],
+        np.array([wraps]),
+        np.array([inside]),
+        np.array([grid.heading]),
+    )
+    state = np.zeros(1, np.int64)
+    moves = look.Moves(*([state] * 14))._replace(successor=state)
+    polar = (np.arctan2(x, z), np.hypot(x, z), y, y)
+    out = np.empty(1)
+    look.values_after(
+        state, 0, look.Places(*(np.array([v]) for v in polar)), moves, behaviours, out
+    )
+    return by_corners, out[0]
 
 
 points = st.tuples(st.floats(-2.5, 2.5), st.floats(0.5, 2.2), st.floats(-2.5, 2.5))
@@ -140,8 +169,9 @@ def test_interpolation_equals_the_twin(point, seed):
         TargetGrid((-1.1, 0.3, 1.2), (1.3, 1.3, 1.6), (10, 10, 4), wraps=False, inside_only=True),
     ):
         value = rng.normal(0, 1, len(grid)).astype(np.float32)
-        got = interpolated(value, grid, point)
-        assert got == pytest.approx(reference.polar_value(value, grid, point), abs=1e-4)
+        wanted = reference.polar_value(value, grid, point)
+        for got in interpolated(value, grid, point):
+            assert got == pytest.approx(wanted, abs=1e-4)
 
 
 def test_interpolation_is_exact_on_grid_points():
@@ -150,8 +180,8 @@ def test_interpolation_is_exact_on_grid_points():
         for m, p in enumerate(grid.points):
             if np.hypot(p[0], p[2]) < 1e-9:
                 continue  # all angles meet at the centre
-            got = interpolated(value, grid, p)
-            assert got == pytest.approx(m, abs=2e-3)
+            for got in interpolated(value, grid, p):
+                assert got == pytest.approx(m, abs=2e-3)
 
 
 def test_rewards_in_closed_form():
@@ -195,7 +225,9 @@ def test_look_ahead_agrees_with_the_table_for_a_standing_target(library: Library
     skill = Skill(library, near, hit, stretch_tracks(library))
     for policy, weights in ((near, (1.0, 0.0)), (hit, (0.0, 1.0))):
         grid = policy.behaviour.grid
-        temper = Temper(*weights, facing=0.0, few=1, slack=0.0, boredom=0.0, personal_space=0.0)
+        temper = Temper(
+            *weights, facing=0.0, few=1, slack=0.0, boredom=0.0, personal_space=0.0, again=1
+        )
         for m in range(1, len(grid), 7):
             fighter = Fighters(skill, [temper], 0)
             far = np.full((1, 1, 2), 1e6)

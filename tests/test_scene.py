@@ -14,6 +14,7 @@ from kumite.clip import tip_positions
 from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.kernels import blow as kernels
+from kumite.kernels import crowd, near
 from kumite.rotation import from_yaw
 from kumite.scene import (
     Event,
@@ -123,7 +124,7 @@ def test_a_scene_file_is_read(tmp_path):
         (GOOD + "strike = nan\n", "character.1.strike"),
         (
             GOOD + "weight = 1\n",
-            r"mine.toml:12: unknown key 'character.1.weight'; expected one of aims_at, appr",
+            r"mine.toml:12: unknown key 'character.1.weight'; expected one of again, aims",
         ),
         (
             GOOD.replace("[0, 1]", "[0, 1e6]"),
@@ -205,7 +206,12 @@ def test_bodies_on_one_spot_are_carried_apart_slowly(library: Library):
     scene = LiveScene(settings, library, seed=0)
     for _ in range(int(4 * scene.fps)):
         before = scene.cast.anchor.copy()
-        scene._keep_apart()
+        place, room = scene.cast.root_position, scene._room
+        near.fill_hash(place, scene._hash)
+        for k in range(3):
+            crowd.push_one(k, place, room.closest, room.most, scene._hash, room.push[k])
+        for k in range(3):
+            crowd.carry_away(k, room.push, scene.cast.anchor, scene.cast.foot_offset)
         moved = np.hypot(*(scene.cast.anchor - before)[:, :2].T)
         assert moved.max() <= PUSH_SPEED / scene.fps + 1e-9  # half of it from each of two others
         scene.step()

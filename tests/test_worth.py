@@ -189,13 +189,16 @@ def test_merging_only_makes_it_later():
     assert coarse.nodes.sum() < fine.nodes.sum()
 
 
-def test_the_policy_chooses_as_a_fighter_does(library: Library):
+@pytest.mark.parametrize("again", [1, 4])
+def test_the_policy_chooses_as_a_fighter_does(library: Library, again: int):
     """A fighter without chance, boredom and cone, followed until it hits."""
     near, hit = solve(library, approach()), solve(library, strike(library))
     skill = Skill(library, near, hit, stretch_tracks(library))
     trials = around(skill, 10, 5)
-    times = time_to_target(skill, trials, "hit", longest=4.0, room=2)
-    temper = Temper(1.0, 6.0, facing=0.0, few=1, slack=0.0, boredom=0.0, personal_space=0.0)
+    times = time_to_target(skill, trials, "hit", longest=4.0, room=2, few=again)
+    temper = Temper(
+        1.0, 6.0, facing=0.0, few=1, slack=0.0, boredom=0.0, personal_space=0.0, again=again
+    )
     table, tracks = library.table, skill.tracks
     for state, target, found in zip(trials.state, trials.target, times.policy):
         fighter, taken, s, seen = Fighters(skill, [temper], 0), 0, state, target

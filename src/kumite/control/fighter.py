@@ -13,9 +13,7 @@ from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.kernels import crowd as kernels
 from kumite.kernels import policy as kernels_policy
-from kumite.kernels.policy import Behaviours, Moves
-
-MANY = 16  # characters that choose at once (2 ms of work) from which threads pay
+from kumite.kernels.look_ahead import Behaviours, Moves
 
 
 @dataclass
@@ -29,13 +27,14 @@ class Temper:
     slack: float = 0.2  # how much less an action may gain than the best one, as a share of that
     boredom: float = 0.5  # how much of its gain an action loses while it was used recently
     memory: int = 6  # how many actions back "recently" goes
+    again: int = 4  # how many of the best actions are weighed once more, a step further ahead
     personal_space: float = 0.7  # m between the bodies that an action must leave
     more: dict[str, float] = field(default_factory=dict)  # weights of other behaviours, by name
 
     def __post_init__(self) -> None:
         self._check_weights()
-        if self.few < 1 or self.memory < 0:
-            raise KumiteError("few: expected at least 1; memory: at least 0")
+        if self.few < 1 or self.again < 1 or self.memory < 0:
+            raise KumiteError("few, again: expected at least 1; memory: at least 0")
 
     def _check_weights(self) -> None:
         every = [self.approach, self.strike, *self.more.values()]
@@ -90,6 +89,7 @@ class Skill:
             tracks.centre_start,
             tracks.centre,
             np.stack([x, z, np.sin(yaw), np.cos(yaw)], axis=1),
+            _discs(tracks),
             tracks.tip,
             tracks.tip_weight,
             tracks.tip_when,
@@ -120,7 +120,17 @@ class Skill:
             np.array([p.value.shape[1] for p in self.policies]),
             *(np.stack([g[c] for g in grids]) for c in range(3)),
             *(np.array([g[c] for g in grids]) for c in (3, 4)),
+            np.array([b.grid.heading for b in every]),
         )
+
+
+def _discs(tracks: Tracks) -> np.ndarray:
+    """Discs (x, z, radius) [L, 3] that hold the root tracks."""
+    start, place = tracks.centre_start, tracks.root[:, :2]
+    low, high = (f.reduceat(place, start[:-1]) for f in (np.minimum, np.maximum))
+    middle = 0.5 * (low + high)
+    away = np.hypot(*(place - np.repeat(middle, np.diff(start), axis=0)).T)
+    return np.column_stack([middle, np.maximum.reduceat(away, start[:-1])])
 
 
 class Fighters:
@@ -136,7 +146,7 @@ class Fighters:
         memory = max((t.memory for t in self.tempers), default=0)
         self.minds = kernels.Minds(
             np.zeros((count, len(skill.policies))),
-            np.zeros((count, 5)),
+            np.zeros((count, 6)),
             np.full((count, memory), -1, dtype=np.int64),
             np.zeros(count, dtype=np.int64),
             np.random.SeedSequence(seed).generate_state(count, np.uint64),
@@ -148,42 +158,25 @@ class Fighters:
             np.zeros(count, dtype=np.int64),
         )
 
-    def _note(self, who: np.ndarray) -> None:
+    def note(self, who: np.ndarray) -> None:
         """The tempers of those who are about to choose, as they are now."""
         names = [p.behaviour.name for p in self.skill.more]
         for k in who.tolist():
             t = self.tempers[k]
             more = [t.more.get(name, 0.0) for name in names]
             self.minds.weights[k] = (t.approach, t.strike, *more)
-            self.minds.temper[k] = (t.facing, t.few, t.slack, t.boredom, t.personal_space)
-
-    def decide(
-        self,
-        who: np.ndarray,
-        states: np.ndarray,
-        place: np.ndarray,
-        grid: kernels.Hash,
-        actors: kernels.Actors,
-        horizon: int,
-    ) -> kernels.Choices:
-        """Characters who [W], each in its state [W] of the action table, pick their next actions.
-
-        place [K, 3]: where all stand, hashed in ``grid``; horizon: frames that the others' motion
-        is foreseen. What is returned holds the last choice of everyone [K].
-        """
-        self._note(who)
-        run = kernels.decide_many if len(who) >= MANY else kernels.decide
-        moves, behaviours = self.skill.moves, self.skill.behaviours
-        run(who, states, place, grid, actors, self.minds, moves, behaviours, horizon, self.choices)
-        return self.choices
+            self.minds.temper[k] = (t.facing, t.few, t.slack, t.boredom, t.personal_space, t.again)
 
     def pick(self, k: int, state: int, target: np.ndarray, others: np.ndarray) -> int:
         """Character k picks an action of a state: its stretch.
 
-        target [H, 3]: the target's expected places at frames 1.. from now, others [O, H, 2] those
-        of bodies to keep apart from; in its facing frame, the last row from then on.
+        target [H, 3]: the target's expected places at frames 1.. from now, or [H, 4] with the way
+        it faces [rad]; others [O, H, 2] those of bodies to keep apart from; in its facing frame,
+        the last row from then on.
         """
-        self._note(np.array([k]))
+        self.note(np.array([k]))
         moves, behaviours = self.skill.moves, self.skill.behaviours
+        if target.shape[1] == 3:
+            target = np.column_stack([target, np.zeros(len(target))])
         kernels.pick(k, state, target, others, self.minds, moves, behaviours, self.choices)
         return int(self.choices.stretch[k])

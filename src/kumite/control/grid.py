@@ -11,13 +11,18 @@ from kumite.errors import KumiteError
 
 @dataclass(frozen=True)
 class TargetGrid:
-    """Angles × distances × heights. Angle 0 is straight ahead (+Z), positive to the left (+X)."""
+    """Angles × distances × heights. Angle 0 is straight ahead (+Z), positive to the left (+X).
+
+    With ``heading`` the third axis is not the target's height but the way it faces [rad], seen
+    from the avatar, from -π to π with both ends.
+    """
 
     low: tuple[float, float, float]  # rad, m, m: the first angle, distance and height
     high: tuple[float, float, float]  # the last ones; of an angle all round, one turn after low
     size: tuple[int, int, int]  # points along each; one height: the grid is flat
     wraps: bool  # the angle goes all round
     inside_only: bool  # values are 0 outside the grid; else the nearest point of it counts
+    heading: bool = False
 
     def __post_init__(self) -> None:
         if min(self.size) < 1 or self.size[0] < 2 or self.size[1] < 2:
@@ -25,6 +30,10 @@ class TargetGrid:
         for low, high, size in zip(self.low, self.high, self.size):
             if not (np.isfinite(low) and np.isfinite(high)) or (size > 1 and high <= low):
                 raise KumiteError(f"target grid: empty range {low}..{high}")
+        if self.heading and not (
+            self.size[2] > 2 and np.allclose([self.low[2], self.high[2]], [-np.pi, np.pi])
+        ):
+            raise KumiteError("target grid: headings must go from -π to π in at least 3 points")
 
     @property
     def step(self) -> tuple[float, float, float]:
@@ -37,7 +46,8 @@ class TargetGrid:
 
     @property
     def points(self) -> np.ndarray:
-        """Grid points [M, 3] in the facing frame; the height varies fastest."""
+        """Grid points [M, 3] in the facing frame: x, height (or heading) and z; the height varies
+        fastest."""
         angle, distance, height = (
             low + step * np.arange(n) for low, step, n in zip(self.low, self.step, self.size)
         )
@@ -78,6 +88,20 @@ def approach_grid(radius: float = 2.0, distances: int = 5, angles: int = 13) -> 
         (angles, distances, 1),
         wraps=True,
         inside_only=False,
+    )
+
+
+def heading_grid(
+    radius: float = 2.0, distances: int = 5, angles: int = 12, headings: int = 13
+) -> TargetGrid:
+    """A grid for where a target is and which way it faces: every 30° of both by default."""
+    return TargetGrid(
+        (-np.pi, 0.0, -np.pi),
+        (np.pi, radius, np.pi),
+        (angles, distances, headings),
+        wraps=True,
+        inside_only=False,
+        heading=True,
     )
 
 

@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from kumite.clip import LIMBS
-from kumite.control.grid import TargetGrid, approach_grid, strike_grid
+from kumite.control.grid import TargetGrid, approach_grid, heading_grid, strike_grid
 from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.kernels import policy as kernels
@@ -80,16 +80,19 @@ class Station:
     sigma: float = 0.2  # m, how sharply
     bearing: float | None = None  # deg to the left of straight ahead where the target is wanted
     bearing_sigma: float = 30.0  # deg, how sharply
+    heading: float | None = None  # deg to the left of the target's own heading to face along
+    heading_sigma: float = 30.0  # deg, how sharply
     orbit: float = 0.0  # rad/s wanted round the target: + to the avatar's right hand; 0: none
     always: bool = False  # all the time, not at the best moment
 
     def __post_init__(self) -> None:
         if self.point not in ("body", "reach"):
             raise KumiteError(f"station: point {self.point!r}, expected body or reach")
-        if not (self.distance >= 0 and self.sigma > 0 and self.bearing_sigma > 0):
+        if not (self.distance >= 0 and min(self.sigma, self.bearing_sigma, self.heading_sigma) > 0):
             raise KumiteError("station: expected distance not below 0 m, sigmas above 0")
-        if not np.isfinite([self.distance, self.orbit, self.bearing or 0.0]).all():
-            raise KumiteError("station: distance, bearing and orbit must be finite")
+        angles = [self.bearing or 0.0, self.heading or 0.0]
+        if not np.isfinite([self.distance, self.orbit, *angles]).all():
+            raise KumiteError("station: distance, bearing, heading and orbit must be finite")
 
 
 @dataclass(frozen=True)
@@ -111,6 +114,12 @@ class Behaviour:
             raise KumiteError(
                 f"unknown behaviour {self.name!r}: expected approach, strike, or one with a station"
             )
+        turned = self.station is not None and self.station.heading is not None
+        if turned != self.grid.heading:
+            raise KumiteError(
+                f"{self.name}: a station with a heading needs a grid of headings "
+                "(kumite.control.heading_grid), and no other does"
+            )
         if not 0 <= self.nearest < self.farthest:
             raise KumiteError(f"{self.name}: active from {self.nearest} to {self.farthest} m")
         if not 0 < self.discount_per_second < 1:
@@ -131,12 +140,19 @@ def circle(distance: float = 1.1, orbit: float = 0.7) -> Behaviour:
     return Behaviour("circle", approach_grid(), station=station)
 
 
+def take_place(distance: float = 0.0) -> Behaviour:
+    """Reach the target's place, or a distance [m] from it, and face the way it faces."""
+    station = Station(distance=distance, sigma=0.15, heading=0.0, heading_sigma=25.0, always=True)
+    return Behaviour("take_place", heading_grid(), station=station)
+
+
 BEHAVIOURS: dict[str, Callable[[Library], Behaviour]] = {
     "approach": lambda library: approach(),
     "strike": lambda library: strike(library),
     "keep_off": lambda library: keep_off(),
     "circle": lambda library: circle(),
     "circle_back": lambda library: replace(circle(orbit=-0.7), name="circle_back"),
+    "take_place": lambda library: take_place(),
 }
 """Behaviours that scenes may name."""
 
@@ -174,8 +190,8 @@ def frame_discount(behaviour: Behaviour, fps: float) -> float:
 
 
 def reward_params(behaviour: Behaviour, fps: float) -> np.ndarray:
-    """What a behaviour rewards [7], as the kernels take it."""
-    out = np.zeros(7)
+    """What a behaviour rewards [9], as the kernels take it."""
+    out = np.zeros(9)
     s = behaviour.station
     if s is None:
         near = behaviour.name == "approach"
@@ -186,6 +202,9 @@ def reward_params(behaviour: Behaviour, fps: float) -> np.ndarray:
     if s.bearing is not None:
         out[kernels.BEARING] = np.radians(s.bearing)
         out[kernels.BEARING_SIGMA] = np.radians(s.bearing_sigma)
+    if s.heading is not None:
+        out[kernels.HEADING] = np.radians(s.heading)
+        out[kernels.HEADING_SIGMA] = np.radians(s.heading_sigma)
     out[kernels.ORBIT], out[kernels.ALWAYS] = s.orbit / fps, s.always
     return out
 
@@ -198,9 +217,10 @@ def stretch_rewards(behaviour: Behaviour, tracks: Tracks, fps: float) -> np.ndar
     if behaviour.station is not None:
         x, z, yaw = tracks.root.T
         root = np.stack([x, z, np.sin(yaw), np.cos(yaw)], axis=1)
-        params = reward_params(behaviour, fps)
+        params = reward_params(behaviour, fps)[None]
+        target = np.concatenate([points, points[:, 1:2]], axis=1)  # the one of the two that counts
         kernels.station_rewards(
-            root, tracks.centre, tracks.centre_start, params, discount, points, out
+            root, tracks.centre, tracks.centre_start, params, discount, target, out
         )
     elif behaviour.name == "approach":
         kernels.approach_rewards(
@@ -240,7 +260,9 @@ def solve(
     count = 4 if grid.size[2] == 1 else 8
     index = np.empty((len(table.first), len(points), count), dtype=np.int32)
     weight = np.empty(index.shape, dtype=np.float32)
-    kernels.successor_corners(table.displacement, points, *grid.kernel_arguments(), index, weight)
+    kernels.successor_corners(
+        table.displacement, points, grid.heading, *grid.kernel_arguments(), index, weight
+    )
     factor = (frame_discount(behaviour, library.clips.fps) ** table.duration).astype(np.float32)
     value = np.zeros((table.states, len(points)), dtype=np.float32)
     q = np.empty(reward.shape, dtype=np.float32)

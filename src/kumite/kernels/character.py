@@ -17,10 +17,11 @@ import numpy as np
 from numba import prange
 
 from kumite.kernels.jit import kernel, parallel_kernel
-from kumite.kernels.pose import add_rotated, quaternion_product
+from kumite.kernels.pose import quaternion_product
 
 TINY = 1e-12
 LN2 = 0.6931471805599453
+NEAR_ENOUGH = 1e-6  # m within which an ankle is where it should be
 MANY = 256  # characters (2 ms of work) from which threads pay, on cores that others use too
 
 
@@ -74,6 +75,23 @@ class Poses(NamedTuple):
     wxyz: np.ndarray  # [K, J, 4]
     position: np.ndarray  # [K, J, 3]
     world_wxyz: np.ndarray  # [K, J, 4]
+
+
+class Played(NamedTuple):
+    """K characters, what they are played from and what is shown."""
+
+    frame: np.ndarray  # [K] library frame shown
+    stop: np.ndarray  # [K] last frame of the action
+    anchor: np.ndarray  # [K, 3] library world → scene
+    jump: np.ndarray  # [K] bool, whether the last action began with a join
+    first: np.ndarray  # [L] frames of the stretches
+    last: np.ndarray  # [L]
+    blow_of_frame: np.ndarray  # [F, 4]
+    springs: Springs
+    capture: Capture
+    build: Build
+    offsets: Offsets
+    poses: Poses
 
 
 @kernel
@@ -238,32 +256,6 @@ def product(aw, ax, ay, az, bw, bx, by, bz):
 
 
 @kernel
-def turn_joint(joint, parents, delta, wxyz, world_wxyz):
-    """Turn a joint by a rotation given in world axes; only its local rotation is changed."""
-    turned, inverse = np.empty(4), np.empty(4)
-    quaternion_product(delta, world_wxyz[joint], turned)
-    if joint == 0:
-        wxyz[joint, :] = turned
-        return
-    conjugate(world_wxyz[parents[joint]], inverse)
-    quaternion_product(inverse, turned, wxyz[joint])
-
-
-@kernel
-def arc(a, b, out):
-    """The shortest rotation between two directions (not opposite) as a quaternion."""
-    na = np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2) + TINY
-    nb = np.sqrt(b[0] ** 2 + b[1] ** 2 + b[2] ** 2) + TINY
-    out[1] = (a[1] * b[2] - a[2] * b[1]) / (na * nb)
-    out[2] = (a[2] * b[0] - a[0] * b[2]) / (na * nb)
-    out[3] = (a[0] * b[1] - a[1] * b[0]) / (na * nb)
-    out[0] = 1.0 + (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) / (na * nb)
-    n = np.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2 + out[3] ** 2) + TINY
-    for c in range(4):
-        out[c] /= n
-
-
-@kernel
 def pose_joint(j, parents, offsets, wxyz, position, world):
     """Position and world rotation of a joint below the root, whose parent's are up to date."""
     p = parents[j]
@@ -289,7 +281,34 @@ def pose_below(below, parents, offsets, wxyz, position, world_wxyz):
 
 
 @kernel
-def reach(upper, middle, end, below, goal, parents, offsets, wxyz, position, world_wxyz):
+def turned(w, x, y, z, a, b, c):
+    """A vector (a, b, c) turned by a quaternion, in scalars."""
+    tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
+    return a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx
+
+
+@kernel
+def set_local(j, parents, world, w, x, y, z, wxyz):
+    """The local rotation of joint j that gives it a world rotation, under its parent's."""
+    if j == 0:
+        wxyz[0, 0], wxyz[0, 1], wxyz[0, 2], wxyz[0, 3] = w, x, y, z
+        return
+    p = parents[j]
+    wxyz[j, 0], wxyz[j, 1], wxyz[j, 2], wxyz[j, 3] = product(
+        world[p, 0], -world[p, 1], -world[p, 2], -world[p, 3], w, x, y, z
+    )
+
+
+@kernel
+def bend_of(a, b, now, want):
+    """By how much [rad] the joint between bones a and b opens for its ends to be ``want`` apart."""
+    cos_now = min(max((a * a + b * b - now * now) / (2 * a * b + TINY), -1.0), 1.0)
+    cos_want = min(max((a * a + b * b - want * want) / (2 * a * b + TINY), -1.0), 1.0)
+    return np.arccos(cos_want) - np.arccos(cos_now)
+
+
+@kernel
+def reach(upper, middle, end, below, goal, parents, offsets, wxyz, position, world):
     """Two-bone inverse kinematics: bring joint ``end`` to ``goal`` [3], keep its world rotation.
 
     below: the joints that hang from ``upper``, itself first, then -1.
@@ -297,36 +316,57 @@ def reach(upper, middle, end, below, goal, parents, offsets, wxyz, position, wor
     The limb bends in the plane it bends in; out of reach it stretches towards the goal to 99.9 %.
     Leaves local rotations, positions and world rotations up to date.
     """
-    kept = world_wxyz[end].copy()
-    a = np.sqrt(np.sum((position[middle] - position[upper]) ** 2))
-    b = np.sqrt(np.sum((position[end] - position[middle]) ** 2))
-    now = np.sqrt(np.sum((position[end] - position[upper]) ** 2))
-    want = np.sqrt(np.sum((goal - position[upper]) ** 2))
+    ux, uy, uz = position[upper, 0], position[upper, 1], position[upper, 2]
+    mx, my, mz = position[middle, 0], position[middle, 1], position[middle, 2]
+    ex, ey, ez = position[end, 0], position[end, 1], position[end, 2]
+    gx, gy, gz = goal[0] - ux, goal[1] - uy, goal[2] - uz
+    off = (goal[0] - ex) ** 2 + (goal[1] - ey) ** 2 + (goal[2] - ez) ** 2
+    if off < NEAR_ENOUGH * NEAR_ENOUGH:
+        return
+    px, py, pz = ux - mx, uy - my, uz - mz  # from the middle to both ends
+    qx, qy, qz = ex - mx, ey - my, ez - mz
+    a, b = np.sqrt(px * px + py * py + pz * pz), np.sqrt(qx * qx + qy * qy + qz * qz)
+    now = np.sqrt((ex - ux) ** 2 + (ey - uy) ** 2 + (ez - uz) ** 2)
     longest = max(0.999 * (a + b), now)  # a straighter capture than that is not bent by force
-    want = min(max(want, abs(a - b) + 1e-4), longest)
-    cos_now = min(max((a * a + b * b - now * now) / (2 * a * b + TINY), -1.0), 1.0)
-    cos_want = min(max((a * a + b * b - want * want) / (2 * a * b + TINY), -1.0), 1.0)
-    bend = np.arccos(cos_now) - np.arccos(cos_want)
-    to_upper = position[upper] - position[middle]
-    to_end = position[end] - position[middle]
-    axis = np.cross(to_upper, to_end)
-    length = np.sqrt(np.sum(axis**2))
-    delta = np.empty(4)
+    want = min(max(np.sqrt(gx * gx + gy * gy + gz * gz), abs(a - b) + 1e-4), longest)
+    ax, ay, az = py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx
+    length = np.sqrt(ax * ax + ay * ay + az * az)
     if length < 1e-6 * a * b:
         # A straight limb: bend about the joint's own side axis, the knee forward (+Z).
-        side = np.array([-1.0, 0.0, 0.0])
-        add_rotated(world_wxyz[middle], side, np.zeros(3), axis)
-        length = np.sqrt(np.sum(axis**2))
-    exponential(axis * (-bend / length), delta)
-    turn_joint(middle, parents, delta, wxyz, world_wxyz)
-    pose_below(below, parents, offsets, wxyz, position, world_wxyz)
-    arc(position[end] - position[upper], goal - position[upper], delta)
-    turn_joint(upper, parents, delta, wxyz, world_wxyz)
-    pose_below(below, parents, offsets, wxyz, position, world_wxyz)
-    inverse = np.empty(4)
-    conjugate(world_wxyz[parents[end]], inverse)
-    quaternion_product(inverse, kept, wxyz[end])
-    pose_below(below, parents, offsets, wxyz, position, world_wxyz)
+        ax, ay, az = turned(
+            world[middle, 0], world[middle, 1], world[middle, 2], world[middle, 3], -1.0, 0.0, 0.0
+        )
+        length = 1.0
+    bend = 0.5 * bend_of(a, b, now, want)
+    s = np.sin(bend) / length
+    bw, bx, by, bz = np.cos(bend), s * ax, s * ay, s * az
+    # Where the end comes to by the bend alone, and the shortest turn from there to the goal.
+    qx, qy, qz = turned(bw, bx, by, bz, qx, qy, qz)
+    vx, vy, vz = mx + qx - ux, my + qy - uy, mz + qz - uz
+    scale = 1.0 / (np.sqrt((vx * vx + vy * vy + vz * vz) * (gx * gx + gy * gy + gz * gz)) + TINY)
+    tw = 1.0 + scale * (vx * gx + vy * gy + vz * gz)
+    tx, ty, tz = (
+        scale * (vy * gz - vz * gy),
+        scale * (vz * gx - vx * gz),
+        scale * (vx * gy - vy * gx),
+    )
+    n = 1.0 / (np.sqrt(tw * tw + tx * tx + ty * ty + tz * tz) + TINY)
+    tw, tx, ty, tz = n * tw, n * tx, n * ty, n * tz
+    w, x, y, z = product(
+        bw, bx, by, bz, world[middle, 0], world[middle, 1], world[middle, 2], world[middle, 3]
+    )
+    set_local(middle, parents, world, w, x, y, z, wxyz)
+    w, x, y, z = product(
+        tw, tx, ty, tz, world[upper, 0], world[upper, 1], world[upper, 2], world[upper, 3]
+    )
+    set_local(upper, parents, world, w, x, y, z, wxyz)
+    p = parents[end]  # it is carried by both turns
+    w, x, y, z = product(bw, bx, by, bz, world[p, 0], world[p, 1], world[p, 2], world[p, 3])
+    w, x, y, z = product(tw, tx, ty, tz, w, x, y, z)
+    wxyz[end, 0], wxyz[end, 1], wxyz[end, 2], wxyz[end, 3] = product(
+        w, -x, -y, -z, world[end, 0], world[end, 1], world[end, 2], world[end, 3]
+    )
+    pose_below(below, parents, offsets, wxyz, position, world)
 
 
 @kernel
@@ -362,9 +402,11 @@ def turned_by(x, y, z):
 
 
 @kernel
-def show_one(k, frame, anchor, dt, springs, capture, build, offsets, poses):
+def show_one(k, dt, played):
     """One frame of character k of :func:`show`."""
-    f = frame[k]
+    f, anchor = played.frame[k], played.anchor
+    springs, capture, build = played.springs, played.capture, played.build
+    offsets, poses = played.offsets, played.poses
     root_position, wxyz = poses.root_position[k], poses.wxyz[k]
     position, world = poses.position[k], poses.world_wxyz[k]
     spring(offsets.root[k], offsets.root_velocity[k], springs.root, dt)
@@ -421,28 +463,24 @@ def show_one(k, frame, anchor, dt, springs, capture, build, offsets, poses):
         reach(thigh, shin, foot, build.below[s], goal, parents, bones, wxyz, position, world)
 
 
-@kernel
-def show(frame, anchor, dt, springs, capture, build, offsets, poses):
-    """One frame of all K characters: offsets move on by dt, poses are made, feet put down."""
-    for k in range(frame.shape[0]):
-        show_one(k, frame, anchor, dt, springs, capture, build, offsets, poses)
+def _show(dt, played):
+    """One frame of all characters: offsets move on by dt, poses are made, feet put down."""
+    for k in prange(played.frame.shape[0]):
+        show_one(k, dt, played)
 
 
-@parallel_kernel
-def show_many(frame, anchor, dt, springs, capture, build, offsets, poses):
-    """:func:`show` on all cores: worth its start-up from ``MANY`` characters on."""
-    for k in prange(frame.shape[0]):
-        show_one(k, frame, anchor, dt, springs, capture, build, offsets, poses)
+show = kernel(_show)
+show_many = parallel_kernel(_show)  # on all cores: worth its start-up from ``MANY`` characters on
 
 
 @kernel
-def begin(who, stretch, first, last, frame, stop, anchor, capture, offsets, jump):
+def begin(who, stretch, played):
     """Characters who [W] take the stretches [K] they chose; jump [K]: whether it was a join."""
     for w in range(who.shape[0]):
         k = who[w]
-        source, target = frame[k], first[stretch[k]] - 1
-        stop[k] = last[stretch[k]]
-        frame[k] = target
-        jump[k] = target != source
-        if jump[k]:
-            join(k, source, target, anchor, capture, offsets)
+        source, target = played.frame[k], played.first[stretch[k]] - 1
+        played.stop[k] = played.last[stretch[k]]
+        played.frame[k] = target
+        played.jump[k] = target != source
+        if target != source:
+            join(k, source, target, played.anchor, played.capture, played.offsets)

@@ -12,25 +12,17 @@ import numpy as np
 from numba import prange
 
 from kumite.kernels.blow import NO_BLOW, NO_HIT, NOBODY, swept_contact
-from kumite.kernels.character import planar_point
+from kumite.kernels.character import begin, planar_point, show_one, turned
 from kumite.kernels.jit import kernel, parallel_kernel
-from kumite.kernels.policy import carry, look_ahead
-from kumite.kernels.pose import add_rotated
+from kumite.kernels.look_ahead import look_ahead, look_further
+from kumite.kernels.near import fill_hash, nearest
+from kumite.kernels.policy import carry, wrapped
 
 NEIGHBOURS = 6  # bodies that a character minds, its opponent among them
 MINDED = 2.2  # m within which it does
-CELL = 2.2  # m, edge of a cell of the hash: no smaller than any radius asked for
 FAR = 1e6  # m, where nobody is
-FACING, FEW, SLACK, BOREDOM, SPACE = range(5)
+FACING, FEW, SLACK, BOREDOM, SPACE, AGAIN = range(6)
 """Columns of a temper."""
-
-
-class Hash(NamedTuple):
-    """A spatial hash of places on the ground, made anew each frame."""
-
-    start: np.ndarray  # [T + 1] int32, T a power of two: first item of a bucket
-    item: np.ndarray  # [K] int32, characters by bucket
-    cell: np.ndarray  # [K, 2] int32, the cell each is in
 
 
 class Actors(NamedTuple):
@@ -41,7 +33,7 @@ class Actors(NamedTuple):
     anchor: np.ndarray  # [K, 3]
     opponent: np.ndarray  # [K] a character, or NOBODY
     thing: np.ndarray  # [K] an object, or NOBODY
-    things: np.ndarray  # [O, 3] m
+    things: np.ndarray  # [O, 4] m, and the way it faces [rad]
     aim: np.ndarray  # [F, 3] m, library world: what opponents aim at (the head)
     root: np.ndarray  # [F, 3] m, library world
     facing: np.ndarray  # [F, 3] library world
@@ -51,7 +43,7 @@ class Minds(NamedTuple):
     """How each character chooses, and what it remembers."""
 
     weights: np.ndarray  # [K, Z] of the behaviours
-    temper: np.ndarray  # [K, 5]
+    temper: np.ndarray  # [K, 6]
     recent: np.ndarray  # [K, M] stretches, or -1
     recent_at: np.ndarray  # [K] where the next one is written
     seed: np.ndarray  # [K] uint64
@@ -67,69 +59,6 @@ class Choices(NamedTuple):
 
 
 @kernel
-def bucket(ix, iz, mask):
-    """Bucket of a cell."""
-    return (ix * 73856093 ^ iz * 19349663) & mask
-
-
-@kernel
-def fill_hash(place, grid):
-    """Sort characters at place [K, 3] (x and z count) into buckets; by number within each."""
-    mask = grid.start.shape[0] - 2
-    grid.start[:] = 0
-    for k in range(place.shape[0]):
-        grid.cell[k, 0] = int(np.floor(place[k, 0] / CELL))
-        grid.cell[k, 1] = int(np.floor(place[k, 2] / CELL))
-        grid.start[bucket(grid.cell[k, 0], grid.cell[k, 1], mask) + 1] += 1
-    for b in range(mask + 1):
-        grid.start[b + 1] += grid.start[b]
-    for k in range(place.shape[0] - 1, -1, -1):
-        b = bucket(grid.cell[k, 0], grid.cell[k, 1], mask)
-        grid.start[b + 1] -= 1
-        grid.item[grid.start[b + 1]] = k
-    # Each start now stands one bucket too far left: it is the bucket's own.
-    for b in range(mask + 1):
-        grid.start[b] = grid.start[b + 1]
-    grid.start[mask + 1] = place.shape[0]
-
-
-@kernel
-def nearest(k, place, radius, grid, found):
-    """The characters nearest to k within a radius [m], nearest first, in found; how many.
-
-    Of equal distances the lower number comes first. found [n] says how many are wanted.
-    """
-    mask = grid.start.shape[0] - 2
-    count = 0
-    distance = np.empty(found.shape[0])
-    for dx in range(-1, 2):
-        for dz in range(-1, 2):
-            ix, iz = grid.cell[k, 0] + dx, grid.cell[k, 1] + dz
-            b = bucket(ix, iz, mask)
-            for i in range(grid.start[b], grid.start[b + 1]):
-                j = grid.item[i]
-                if j == k or grid.cell[j, 0] != ix or grid.cell[j, 1] != iz:
-                    continue
-                x, z = place[j, 0] - place[k, 0], place[j, 2] - place[k, 2]
-                d2 = x * x + z * z
-                if d2 > radius * radius:
-                    continue
-                at = min(count, found.shape[0] - 1)
-                if count == found.shape[0] and not (
-                    d2 < distance[at] or (d2 == distance[at] and j < found[at])
-                ):
-                    continue
-                while at > 0 and (
-                    d2 < distance[at - 1] or (d2 == distance[at - 1] and j < found[at - 1])
-                ):
-                    distance[at], found[at] = distance[at - 1], found[at - 1]
-                    at -= 1
-                distance[at], found[at] = d2, j
-                count = min(count + 1, found.shape[0])
-    return count
-
-
-@kernel
 def draw(seed, k, n):
     """A number 0..n-1 from character k's own stream (splitmix64)."""
     seed[k] += np.uint64(0x9E3779B97F4A7C15)
@@ -142,19 +71,20 @@ def draw(seed, k, n):
 
 @kernel
 def foresee(k, here, actors, target, other):
-    """Where k's target [H, 3] and its body [H, 2] are expected, seen from ``here``."""
+    """Where k's target [H, 4] and its body [H, 2] are expected, seen from ``here``."""
     o = actors.opponent[k]
     for h in range(target.shape[0]):
         if o == NOBODY:
             thing = actors.things[actors.thing[k]]
             target[h, 0], target[h, 2] = carry(here, thing[0], thing[2])
-            target[h, 1] = thing[1]
+            target[h, 1], target[h, 3] = thing[1], wrapped(thing[3] - here[2])
             other[h, 0] = other[h, 1] = FAR  # a thing may be stood under
             continue
         f = min(actors.frame[o] + h + 1, actors.stop[o])
         x, z = planar_point(actors.anchor[o], actors.aim[f, 0], actors.aim[f, 2])
         target[h, 0], target[h, 2] = carry(here, x, z)
         target[h, 1] = actors.aim[f, 1]
+        target[h, 3] = wrapped(actors.anchor[o, 2] + actors.facing[f, 2] - here[2])
         x, z = planar_point(actors.anchor[o], actors.root[f, 0], actors.root[f, 2])
         other[h, 0], other[h, 1] = carry(here, x, z)
 
@@ -169,7 +99,7 @@ def decide_one(k, state, place, grid, actors, minds, moves, behaviours, horizon,
     f = actors.frame[k]
     here[0], here[1] = planar_point(actors.anchor[k], actors.facing[f, 0], actors.facing[f, 1])
     here[2] = actors.anchor[k, 2] + actors.facing[f, 2]
-    target = np.empty((horizon, 3))
+    target = np.empty((horizon, 4))
     others = np.full((NEIGHBOURS, horizon, 2), FAR)
     foresee(k, here, actors, target, others[0])
     count = 1
@@ -188,24 +118,43 @@ def decide_one(k, state, place, grid, actors, minds, moves, behaviours, horizon,
 
 
 @kernel
+def weigh_again(many, state, target, allowed, moves, behaviours, weights, facing, worth):
+    """The best ``many`` of the allowed actions are weighed by two backups: worth [n], in place.
+
+    Only they are allowed from then on: what is weighed otherwise cannot be compared with them.
+    """
+    begin, done = moves.action_start[state], 0
+    for n in np.argsort(-worth):
+        if allowed[n] and done < many:
+            k = moves.stretch[begin + n]
+            worth[n] = look_further(k, target, moves, behaviours, weights, facing)
+            done += 1
+        else:
+            allowed[n] = False
+
+
+@kernel
 def pick(k, state, target, others, minds, moves, behaviours, choices):
-    """Character k picks among the actions of a state, with target [H, 3] and others [O, H, 2]."""
+    """Character k picks among the actions of a state, with target [H, 4] and others [O, H, 2]."""
     temper = minds.temper[k]
     begin, end = moves.action_start[state], moves.action_start[state + 1]
     count = end - begin
     worth, gap = np.empty(count), np.empty(count)
-    weights = minds.weights[k]
-    look_ahead(state, target, others, moves, behaviours, weights, temper[FACING], worth, gap)
+    weights, facing, space = minds.weights[k], temper[FACING], temper[SPACE]
+    look_ahead(state, target, others, space, moves, behaviours, weights, facing, worth, gap)
     apart, widest = 0, -1.0
     for n in range(count):
-        apart += gap[n] >= temper[SPACE]
+        apart += gap[n] >= space
         widest = max(widest, gap[n])
     # Where every action would come too near, those that stay farthest off.
-    least = temper[SPACE] if apart else widest - 0.02
+    least = space if apart else widest - 0.02
     allowed = gap >= least
     # What counts is how much better an action is than the usual one: far from the target all are
     # worth nearly the same, and still one of them leads there.
     usual = np.median(worth[allowed])
+    if temper[AGAIN] > 1.0:
+        many = int(temper[AGAIN])
+        weigh_again(many, state, target, allowed, moves, behaviours, weights, facing, worth)
     gain = worth - usual
     for n in range(count):
         if not allowed[n]:
@@ -243,22 +192,6 @@ def pick(k, state, target, others, minds, moves, behaviours, choices):
 
 
 @kernel
-def decide(who, states, place, grid, actors, minds, moves, behaviours, horizon, choices):
-    """Every character of who [W], in its state [W], picks its next action: all at once."""
-    for w in range(who.shape[0]):
-        k = who[w]
-        decide_one(k, states[w], place, grid, actors, minds, moves, behaviours, horizon, choices)
-
-
-@parallel_kernel
-def decide_many(who, states, place, grid, actors, minds, moves, behaviours, horizon, choices):
-    """:func:`decide` on all cores."""
-    for w in prange(who.shape[0]):
-        k = who[w]
-        decide_one(k, states[w], place, grid, actors, minds, moves, behaviours, horizon, choices)
-
-
-@kernel
 def push_one(k, place, radius, most, grid, push):
     """How far [2] character k is carried away this frame from those nearer than radius [m]."""
     found = np.empty(8, dtype=np.int64)
@@ -277,16 +210,13 @@ def push_one(k, place, radius, most, grid, push):
 
 
 @kernel
-def keep_apart(place, radius, most, grid, push, anchor, foot):
-    """Carry bodies nearer than radius [m] apart, by at most ``most`` [m] a pair; feet stay."""
-    for k in range(place.shape[0]):
-        push_one(k, place, radius, most, grid, push[k])
-    for k in range(place.shape[0]):
-        anchor[k, 0] += push[k, 0]
-        anchor[k, 1] += push[k, 1]
-        for f in range(2):
-            foot[k, f, 0] -= push[k, 0]
-            foot[k, f, 2] -= push[k, 1]
+def carry_away(k, push, anchor, foot):
+    """Move character k by its push; planted feet stay where they are."""
+    anchor[k, 0] += push[k, 0]
+    anchor[k, 1] += push[k, 1]
+    for f in range(2):
+        foot[k, f, 0] -= push[k, 0]
+        foot[k, f, 2] -= push[k, 1]
 
 
 class Shapes(NamedTuple):
@@ -312,40 +242,74 @@ class Blows(NamedTuple):
     thrown: np.ndarray  # [K, 4] the blow each limb is throwing, or NO_BLOW
     landed: np.ndarray  # [K, 4] the last blow of the limb that landed
     begun: np.ndarray  # [K, 4] bool, thrown since the last frame
+    flying: np.ndarray  # [K] bool, whether any of them may still land
     part: np.ndarray  # [K, 4] what was hit in this frame, or NO_HIT
     when: np.ndarray  # [K, 4] 0..1 within the frame
 
 
 @kernel
-def measure_one(k, position, world_wxyz, shapes, blows):
-    """Fists and body parts of character k in the pose just made; the last become those before."""
-    for s in range(4):
-        j = shapes.tip_joint[s]
-        blows.tip[0, k, s] = blows.tip[1, k, s]
-        add_rotated(world_wxyz[k, j], shapes.tip_offset[s], position[k, j], blows.tip[1, k, s])
-    for p in range(shapes.joint.shape[0]):
-        j = shapes.joint[p]
-        blows.a[0, k, p] = blows.a[1, k, p]
-        blows.b[0, k, p] = blows.b[1, k, p]
-        add_rotated(world_wxyz[k, j], shapes.start[p], position[k, j], blows.a[1, k, p])
-        add_rotated(world_wxyz[k, j], shapes.end[p], position[k, j], blows.b[1, k, p])
+def carried_point(k, j, position, world_wxyz, v, i):
+    """Point v[i] of joint j of character k, in the scene."""
+    x, y, z = turned(
+        world_wxyz[k, j, 0],
+        world_wxyz[k, j, 1],
+        world_wxyz[k, j, 2],
+        world_wxyz[k, j, 3],
+        v[i, 0],
+        v[i, 1],
+        v[i, 2],
+    )
+    return position[k, j, 0] + x, position[k, j, 1] + y, position[k, j, 2] + z
 
 
 @kernel
-def throw_one(k, blow, blows):
-    """Note which blows [4] of character k have begun; a limb that rests may throw them again."""
+def measure_one(k, position, world_wxyz, shapes, blows):
+    """Fists and body parts of character k in the pose just made; the last become those before."""
+    tip, a, b = blows.tip, blows.a, blows.b
     for s in range(4):
-        blows.begun[k, s] = blow[s] != NO_BLOW and blow[s] != blows.thrown[k, s]
-        blows.thrown[k, s] = blow[s]
-        if blow[s] == NO_BLOW:
+        for c in range(3):
+            tip[0, k, s, c] = tip[1, k, s, c]
+        j = shapes.tip_joint[s]
+        tip[1, k, s, 0], tip[1, k, s, 1], tip[1, k, s, 2] = carried_point(
+            k, j, position, world_wxyz, shapes.tip_offset, s
+        )
+    for p in range(shapes.joint.shape[0]):
+        for c in range(3):
+            a[0, k, p, c] = a[1, k, p, c]
+            b[0, k, p, c] = b[1, k, p, c]
+        j = shapes.joint[p]
+        a[1, k, p, 0], a[1, k, p, 1], a[1, k, p, 2] = carried_point(
+            k, j, position, world_wxyz, shapes.start, p
+        )
+        b[1, k, p, 0], b[1, k, p, 1], b[1, k, p, 2] = carried_point(
+            k, j, position, world_wxyz, shapes.end, p
+        )
+
+
+@kernel
+def throw_one(k, blow_of_frame, f, blows):
+    """Note which blows character k throws at frame f; a limb that rests may throw them again.
+
+    Returns how many have begun and whether any may land.
+    """
+    begun, flying = 0, False
+    for s in range(4):
+        blow = blow_of_frame[f, s]
+        blows.begun[k, s] = blow != NO_BLOW and blow != blows.thrown[k, s]
+        blows.thrown[k, s] = blow
+        blows.part[k, s] = NO_HIT
+        if blow == NO_BLOW:
             blows.landed[k, s] = NO_BLOW
+        begun += blows.begun[k, s]
+        flying = flying or blow != blows.landed[k, s]
+    return begun, flying
 
 
 @kernel
 def hit_one(k, victim, shapes, blows):
-    """Which blows of character k touch the victim's target parts during this frame."""
+    """Which blows of character k touch the victim's target parts during this frame; how many."""
+    count = 0
     for s in range(4):
-        blows.part[k, s] = NO_HIT
         blows.when[k, s] = 2.0
         blow = blows.thrown[k, s]
         if victim == NOBODY or blow == NO_BLOW or blow == blows.landed[k, s]:
@@ -367,31 +331,72 @@ def hit_one(k, victim, shapes, blows):
             if t >= 0.0 and t < blows.when[k, s]:
                 blows.when[k, s] = t
                 blows.part[k, s] = p
+        count += blows.part[k, s] != NO_HIT
+    return count
+
+
+class Room(NamedTuple):
+    """How bodies that come too near are carried apart, and where that is worked out."""
+
+    closest: float  # m between pelvises under which they are
+    most: float  # m a frame and pair
+    push: np.ndarray  # [K, 2] m
 
 
 @kernel
-def test_blows(frame, opponent, blow_of_frame, position, world_wxyz, shapes, blows):
-    """Fists, bodies and hits of all characters; how many blows began or landed in this frame."""
+def start_blows(played, grid, shapes, blows):
+    """What :func:`step` expects of the frame before the first: places hashed, bodies measured."""
+    fill_hash(played.poses.root_position, grid)
+    for k in range(played.frame.shape[0]):
+        measure_one(k, played.poses.position, played.poses.world_wxyz, shapes, blows)
+        throw_one(k, played.blow_of_frame, played.frame[k], blows)
+
+
+def _step(
+    who,
+    states,
+    dt,
+    horizon,
+    played,
+    grid,
+    actors,
+    minds,
+    moves,
+    behaviours,
+    choices,
+    room,
+    shapes,
+    blows,
+):
+    """One frame of all characters: who [W], in states [W], choose, all at once; everyone moves on,
+    bodies are kept apart, blows are tested. How many blows began or landed.
+
+    grid must hold where all stand, and does so again afterwards.
+    """
+    place = played.poses.root_position
+    for w in prange(who.shape[0]):
+        decide_one(
+            who[w], states[w], place, grid, actors, minds, moves, behaviours, horizon, choices
+        )
+    begin(who, choices.stretch, played)
+    for k in prange(played.frame.shape[0]):
+        played.frame[k] += 1
+        show_one(k, dt, played)
+    fill_hash(place, grid)
+    for k in prange(played.frame.shape[0]):
+        push_one(k, place, room.closest, room.most, grid, room.push[k])
+    for k in prange(played.frame.shape[0]):
+        carry_away(k, room.push, played.anchor, played.offsets.foot)
     count = 0
-    for k in range(frame.shape[0]):
-        measure_one(k, position, world_wxyz, shapes, blows)
-        throw_one(k, blow_of_frame[frame[k]], blows)
-    for k in range(frame.shape[0]):
-        hit_one(k, opponent[k], shapes, blows)
-        for s in range(4):
-            count += blows.begun[k, s] or blows.part[k, s] != NO_HIT
+    for k in prange(played.frame.shape[0]):
+        measure_one(k, played.poses.position, played.poses.world_wxyz, shapes, blows)
+        begun, blows.flying[k] = throw_one(k, played.blow_of_frame, played.frame[k], blows)
+        count += begun
+    for k in prange(played.frame.shape[0]):
+        if blows.flying[k]:
+            count += hit_one(k, actors.opponent[k], shapes, blows)
     return count
 
 
-@parallel_kernel
-def test_blows_many(frame, opponent, blow_of_frame, position, world_wxyz, shapes, blows):
-    """:func:`test_blows` on all cores."""
-    count = 0
-    for k in prange(frame.shape[0]):
-        measure_one(k, position, world_wxyz, shapes, blows)
-        throw_one(k, blow_of_frame[frame[k]], blows)
-    for k in prange(frame.shape[0]):
-        hit_one(k, opponent[k], shapes, blows)
-        for s in range(4):
-            count += blows.begun[k, s] or blows.part[k, s] != NO_HIT
-    return count
+step = kernel(_step)
+step_many = parallel_kernel(_step)  # on all cores

@@ -17,7 +17,8 @@ import numpy as np
 from numba import prange
 
 from kumite.kernels.jit import kernel, parallel_kernel
-from kumite.kernels.policy import carry, look_ahead, off_the_rim, reward_now
+from kumite.kernels.look_ahead import look_ahead, look_further
+from kumite.kernels.policy import carry
 
 NEVER = -1
 EMPTY = np.int64(-1)
@@ -189,42 +190,16 @@ def best_frames(moves, marks, reach, state, target, tolerance, cell, search):
 
 
 @kernel
-def _backed_up(moves, behaviours, weights, state, x, y, z, worth, gap):
-    """One exact backup for a standing target (``look_ahead``); how many actions there are."""
-    target, nobody = np.array([[x, y, z]]), np.full((1, 1, 2), np.inf)
-    look_ahead(state, target, nobody, moves, behaviours, weights, 0.0, worth, gap)
-    return moves.action_start[state + 1] - moves.action_start[state]
-
-
-@kernel
-def _two_backups(moves, behaviours, weights, k, x, y, z, worth, gap):
-    """What a stretch earns and the best that can be had after it, by another exact backup."""
-    target = np.array([[x, y, z]])
-    now = 0.0
-    after = np.zeros(len(weights))
-    for b in range(len(weights)):
-        if weights[b] == 0.0:
-            continue
-        share = off_the_rim(behaviours, b, x, z)
-        kind, params, discount = behaviours.kind[b], behaviours.params[b], behaviours.discount[b]
-        now += weights[b] * reward_now(
-            k, kind, params, discount, target, share * x, share * z, moves
-        )
-        after[b] = weights[b] * discount ** moves.duration[k]
-    u, v = carry(moves.displacement[k], x, z)
-    count = _backed_up(moves, behaviours, after, moves.successor[k], u, y, v, worth, gap)
-    return now + worth[:count].max()
-
-
-@kernel
-def choose(moves, behaviours, weights, few, state, x, y, z, worth, further, gap):
+def choose(moves, behaviours, weights, few, state, x, y, z, worth, gap):
     """The stretch of the action that is worth most; the first of equals.
 
-    By one exact backup; where few > 1, that many of the best are weighed again by two. worth,
-    further, gap [most actions of a state] are room to work in.
+    By one exact backup; where few > 1, that many of the best are weighed again by two. worth, gap
+    [most actions of a state] are room to work in.
     """
     first = moves.action_start[state]
-    count = _backed_up(moves, behaviours, weights, state, x, y, z, worth, gap)
+    count = moves.action_start[state + 1] - first
+    target, nobody = np.array([[x, y, z, 0.0]]), np.empty((0, 1, 2))
+    look_ahead(state, target, nobody, 0.0, moves, behaviours, weights, 0.0, worth, gap)
     if few <= 1:
         return moves.stretch[first + np.argmax(worth[:count])]
     best, most = moves.stretch[first], -np.inf
@@ -232,7 +207,7 @@ def choose(moves, behaviours, weights, few, state, x, y, z, worth, further, gap)
         a = np.argmax(worth[:count])
         worth[a] = -np.inf
         k = moves.stretch[first + a]
-        value = _two_backups(moves, behaviours, weights, k, x, y, z, further, gap)
+        value = look_further(k, target, moves, behaviours, weights, 0.0)
         if value > most:
             best, most = k, value
     return best
@@ -242,11 +217,11 @@ def choose(moves, behaviours, weights, few, state, x, y, z, worth, further, gap)
 def policy_frames(moves, marks, behaviours, weights, few, state, target, tolerance, horizon):
     """Frames until the greedy policy reaches a target [3], NEVER within ``horizon``."""
     most = np.max(np.diff(moves.action_start))
-    worth, further, gap = np.empty(most), np.empty(most), np.empty(most)
+    worth, gap = np.empty(most), np.empty(most)
     x, y, z = target
     taken = 0
     while taken < horizon:
-        k = choose(moves, behaviours, weights, few, state, x, y, z, worth, further, gap)
+        k = choose(moves, behaviours, weights, few, state, x, y, z, worth, gap)
         after = first_reached(marks, k, x, y, z, tolerance)
         if after != NEVER:
             return taken + after if taken + after <= horizon else NEVER

@@ -24,6 +24,7 @@ from kumite.control import (
 from kumite.errors import KumiteError, unknown
 from kumite.graph import Library
 from kumite.kernels import crowd as kernels
+from kumite.kernels import near
 from kumite.kernels.blow import NO_BLOW, NO_HIT, NOBODY, swept_contact
 from kumite.kernels.character import MANY
 from kumite.rotation import rotate
@@ -127,6 +128,7 @@ class LiveScene:
                 c.strike,
                 c.facing,
                 c.few,
+                again=c.again,
                 personal_space=c.personal_space,
                 more=dict(c.behaviours),
             )
@@ -209,7 +211,9 @@ class LiveScene:
             cast.place(k, int(rng.choice(common)), facing)
         cast.show(0.0)
         clips = self.library.clips
-        self._things = np.array([o.position for o in self.objects]).reshape(-1, 3)
+        yaws = np.radians([o.yaw_deg for o in self.settings.object])
+        self._things = np.zeros((len(self.objects), 4))
+        self._things[:, 3] = yaws
         self._actors = kernels.Actors(
             cast.frame,
             cast.stop,
@@ -223,13 +227,13 @@ class LiveScene:
         )
         self._aim()
         buckets = 1 << max(3, int(2 * count - 1).bit_length())
-        self._hash = kernels.Hash(
+        self._hash = near.Hash(
             np.zeros(buckets + 1, dtype=np.int32),
             np.zeros(count, dtype=np.int32),
             np.zeros((count, 2), dtype=np.int32),
         )
         parts, limbs = len(self.body), len(LIMBS)
-        self._push = np.zeros((count, 2))
+        self._room = kernels.Room(CLOSEST, PUSH_SPEED / self.fps, np.zeros((count, 2)))
         self._blows = kernels.Blows(
             np.zeros((2, count, limbs, 3)),
             np.zeros((2, count, parts, 3)),
@@ -237,10 +241,11 @@ class LiveScene:
             np.full((count, limbs), NO_BLOW, dtype=np.int32),
             np.full((count, limbs), NO_BLOW, dtype=np.int32),
             np.zeros((count, limbs), dtype=bool),
+            np.zeros(count, dtype=bool),
             np.full((count, limbs), NO_HIT, dtype=np.int64),
             np.zeros((count, limbs)),
         )
-        self._find_blows()
+        kernels.start_blows(cast.played, self._hash, self._shapes, self._blows)
 
     def _aim(self) -> None:
         """Who aims at whom: as the scene says, or at the nearest who is free (or else at all)."""
@@ -284,28 +289,43 @@ class LiveScene:
         """One frame: who has ended an action chooses, all move, blows are tested."""
         if self.frame % round(REPAIRING * self.fps) == 0 and self.frame:
             self._aim()
-        who = self.cast.waiting
-        if len(who):
-            self._decide(who)
-        self.cast.advance()
+        for o, thing in enumerate(self.objects):
+            self._things[o, :3] = thing.position
+        cast, blows = self.cast, self._blows
+        who = cast.waiting
+        states = np.searchsorted(self.library.table.state_frame, cast.frame[who])
+        self.fighters.note(who)
+        run = kernels.step_many if cast.count >= MANY else kernels.step
+        happened = run(
+            who,
+            states,
+            1.0 / self.fps,
+            self._horizon,
+            cast.played,
+            self._hash,
+            self._actors,
+            self.fighters.minds,
+            self.skill.moves,
+            self.skill.behaviours,
+            self.fighters.choices,
+            self._room,
+            self._shapes,
+            blows,
+        )
+        self._note_decisions(who, states)
         self.frame += 1
-        self._keep_apart()
-        self._find_blows()
+        if happened:
+            for k, s in np.argwhere(blows.begun).tolist():
+                self._event("strike", k, limb=LIMBS[s], blow=int(blows.thrown[k, s]))
+            for k, s in np.argwhere(blows.part != NO_HIT).tolist():
+                self._land(k, s)
         if self.objects:
             self._test_objects()
             self._swing_objects()
         return True
 
-    # Deciding ------------------------------------------------------------------------------------
-
-    def _decide(self, who: np.ndarray) -> None:
-        for o, thing in enumerate(self.objects):
-            self._things[o] = thing.position
-        states = np.searchsorted(self.library.table.state_frame, self.cast.frame[who])
-        place = self.cast.root_position
-        kernels.fill_hash(place, self._hash)
-        choices = self.fighters.decide(who, states, place, self._hash, self._actors, self._horizon)
-        jump = self.cast.begin(who, choices.stretch)
+    def _note_decisions(self, who: np.ndarray, states: np.ndarray) -> None:
+        choices, jump = self.fighters.choices, self.cast.jump
         for k, state in zip(who.tolist(), states.tolist()):
             self._event(
                 "decision",
@@ -317,42 +337,6 @@ class LiveScene:
                 apart=int(choices.apart[k]),
                 jump=bool(jump[k]),
             )
-
-    # Bodies --------------------------------------------------------------------------------------
-
-    def _keep_apart(self) -> None:
-        """Bodies that come too near are carried apart, slowly; planted feet stay."""
-        place = self.cast.root_position
-        kernels.fill_hash(place, self._hash)
-        kernels.keep_apart(
-            place,
-            CLOSEST,
-            PUSH_SPEED / self.fps,
-            self._hash,
-            self._push,
-            self.cast.anchor,
-            self.cast.foot_offset,
-        )
-
-    def _find_blows(self) -> None:
-        """Fists and bodies of the pose just made, blows begun, blows landed."""
-        cast = self.cast
-        run = kernels.test_blows_many if cast.count >= MANY else kernels.test_blows
-        happened = run(
-            cast.frame,
-            self._actors.opponent,
-            cast.blow_of_frame,
-            cast.position,
-            cast.world_wxyz,
-            self._shapes,
-            self._blows,
-        )
-        if not happened or self.frame == 0:
-            return
-        for k, s in np.argwhere(self._blows.begun).tolist():
-            self._event("strike", k, limb=LIMBS[s], blow=int(self._blows.thrown[k, s]))
-        for k, s in np.argwhere(self._blows.part != NO_HIT).tolist():
-            self._land(k, s)
 
     def _land(self, k: int, s: int) -> None:
         """Limb s of character k has hit its opponent: say so, and let the struck segment give."""

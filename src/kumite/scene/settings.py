@@ -36,6 +36,7 @@ class CharacterSettings(_Settings):
     behaviours: dict[str, Weight] = {}  # weights of others, by name
     facing: Annotated[Finite, Field(ge=0)] = 3.0
     few: Annotated[int, Field(ge=1, le=50)] = 3  # drawn from the best few actions
+    again: Annotated[int, Field(ge=1, le=50)] = 4  # of the best actions weighed a step further
     personal_space: Annotated[Finite, Field(ge=0, le=3)] = 0.7  # m kept to the other's body
 
     @model_validator(mode="after")
@@ -48,6 +49,7 @@ class CharacterSettings(_Settings):
 class ObjectSettings(_Settings):
     name: Name
     position: tuple[Metres, Metres, Metres]  # m
+    yaw_deg: Finite = 0.0  # the way it faces, for behaviours that mind it
     radius: Annotated[Finite, Field(gt=0, le=5)] = 0.1
     draggable: bool = True
 
@@ -62,6 +64,7 @@ class CrowdSettings(_Settings):
     behaviours: dict[str, Weight] = {}
     facing: Annotated[Finite, Field(ge=0)] = 3.0
     few: Annotated[int, Field(ge=1, le=50)] = 3
+    again: Annotated[int, Field(ge=1, le=50)] = 1  # a crowd decides in a fifth of the time
     personal_space: Annotated[Finite, Field(ge=0, le=3)] = 0.7
 
     def characters(self) -> tuple[CharacterSettings, ...]:

@@ -36,7 +36,7 @@ class Cast:
         position, _ = clips.world
         feet = [skeleton.joint(f"{side}_foot") for side in SIDES]
         legs = [[skeleton.joint(f"{s}_{p}") for p in ("thigh", "shin", "foot")] for s in SIDES]
-        self._capture = kernels.Capture(
+        capture = kernels.Capture(
             clips.fps,
             clips.root_position,
             clips.wxyz,
@@ -45,7 +45,7 @@ class Cast:
             library.contacts.on_ground,
             clips.clip_of_frame,
         )
-        self._build = kernels.Build(
+        build = kernels.Build(
             skeleton.parents, skeleton.offsets, np.array(legs), _below(skeleton, legs)
         )
         self.frame = np.zeros(count, dtype=np.int64)  # library frame shown
@@ -56,13 +56,25 @@ class Cast:
         self.wxyz[..., 0] = 1.0
         self.position = np.zeros((count, joints, 3))
         self.world_wxyz = self.wxyz.copy()
-        self._poses = kernels.Poses(self.root_position, self.wxyz, self.position, self.world_wxyz)
         shapes = [(joints, 3), (3,), (2, 3), (joints, 3)]  # joint, root, foot, reaction
         self._offsets = kernels.Offsets(
             *(np.zeros((count, *shape)) for shape in shapes for _ in ("offset", "velocity"))
         )
-        self._jump = np.zeros(count, dtype=bool)
-        self.blow_of_frame = _blow_windows(library)
+        self.jump = np.zeros(count, dtype=bool)  # whether the last action began with a join
+        self.played = kernels.Played(
+            self.frame,
+            self.stop,
+            self.anchor,
+            self.jump,
+            library.table.first,
+            library.table.last,
+            _blow_windows(library),
+            SPRINGS,
+            capture,
+            build,
+            self._offsets,
+            kernels.Poses(self.root_position, self.wxyz, self.position, self.world_wxyz),
+        )
 
     @property
     def contacts(self) -> np.ndarray:
@@ -87,25 +99,9 @@ class Cast:
         for array in self._offsets:
             array[k] = 0.0
 
-    def begin(self, who: np.ndarray, stretch: np.ndarray) -> np.ndarray:
-        """Characters who [W] take actions, stretches [K], from the states they are in.
-
-        Whether each was a jump [K] bool, of those who did.
-        """
-        table = self.library.table
-        kernels.begin(
-            who,
-            stretch,
-            table.first,
-            table.last,
-            self.frame,
-            self.stop,
-            self.anchor,
-            self._capture,
-            self._offsets,
-            self._jump,
-        )
-        return self._jump
+    def begin(self, who: np.ndarray, stretch: np.ndarray) -> None:
+        """Characters who [W] take actions, stretches [K], from the states they are in."""
+        kernels.begin(who, stretch, self.played)
 
     def advance(self) -> None:
         """Everyone one frame on, along the action begun."""
@@ -115,16 +111,7 @@ class Cast:
     def show(self, dt: float) -> None:
         """Make the poses of the frames that the characters are at, offsets moved on by dt [s]."""
         show = kernels.show_many if self.count >= kernels.MANY else kernels.show
-        show(
-            self.frame,
-            self.anchor,
-            float(dt),
-            SPRINGS,
-            self._capture,
-            self._build,
-            self._offsets,
-            self._poses,
-        )
+        show(float(dt), self.played)
 
     @property
     def foot_offset(self) -> np.ndarray:
