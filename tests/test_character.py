@@ -12,9 +12,12 @@ from kumite.clip import SIDES, forward_kinematics
 from kumite.graph import Library
 from kumite.kernels import character as kernels
 from kumite.kernels import pose
+from kumite.scene.live import RECOIL
 from kumite.synthesis import Cast
-from kumite.synthesis.cast import _below
+from kumite.synthesis.cast import MOST_GIVEN, _below
 from tests import toys
+
+FRONT = np.array([0.0, 0.0, 1.0])
 
 
 @pytest.mark.jit_off
@@ -255,6 +258,80 @@ def test_a_struck_head_gives_way_along_the_blow_and_recovers(library: Library):
     assert np.linalg.norm(moved[-1]) < 2e-3
     feet = [s.joint("left_foot"), s.joint("right_foot")]
     assert np.allclose(cast.position[0, feet], rest[feet], atol=2e-3)
+
+
+def _elbow(cast: Cast, side: str) -> float:
+    """How far an elbow is bent [rad]."""
+    joint = cast.library.clips.skeleton.joint
+    at = [cast.position[0, joint(f"{side}_{p}")] for p in ("upper_arm", "forearm", "hand")]
+    upper, fore = at[1] - at[0], at[2] - at[1]
+    return float(np.arctan2(np.linalg.norm(np.cross(upper, fore)), upper @ fore))
+
+
+@pytest.mark.parametrize("part", ["upper_arm", "forearm", "hand"])
+def test_a_struck_arm_gives_way_and_recovers(library: Library, part: str):
+    """A blow of 6 m/s against a guard, beside the same guard that nobody strikes."""
+    joint = library.clips.skeleton.joint
+    far = {"upper_arm": "forearm", "forearm": "hand", "hand": "hand"}[part]
+    for state in range(0, library.table.states, 7):
+        struck, left = Cast(library, 1), Cast(library, 1)
+        for cast in (struck, left):
+            cast.place(0, state, np.zeros(3))
+            cast.show(0.0)
+        here = [joint(f"left_{part}"), joint(f"left_{far}")]
+        struck.strike(0, here[0], left.position[0, here].mean(axis=0), RECOIL * 6 * -FRONT)
+        moved, trunk, bent = [np.zeros(3)], [], []
+        for _ in range(36):
+            for cast in (struck, left):
+                cast.show(1 / 60)
+            moved.append((struck.position[0, here] - left.position[0, here]).mean(axis=0))
+            neck = joint("head")
+            trunk.append(np.linalg.norm(struck.position[0, neck] - left.position[0, neck]))
+            bent.append(_elbow(struck, "left") - _elbow(left, "left"))
+        moved = np.array(moved)
+        away = np.linalg.norm(moved, axis=1)
+        assert 0.04 <= away.max() <= 0.12
+        assert moved[away.argmax()] @ -FRONT > 0.8 * away.max()  # along the blow
+        assert away.argmax() <= 8 and away[30] < 0.2 * away.max()  # frames of 1/60 s
+        assert np.all(np.diff(away[away.argmax() :]) < 0)  # back without swinging over
+        # Continuous: no faster than a spring of that peak and half-life.
+        assert np.abs(np.diff(moved, axis=0)).max() < away.max() * np.e * np.log(4) / 0.16 / 60
+        assert min(bent) > -1e-6 and _elbow(left, "left") + max(bent) < np.radians(151)
+        assert 0.002 < max(trunk) < 0.5 * away.max()  # the trunk has its share
+
+
+def test_a_blow_that_would_open_an_elbow_is_left_to_the_shoulder(library: Library):
+    joint = library.clips.skeleton.joint
+    cast = Cast(library, 1)
+    cast.place(0, 0, np.zeros(3))
+    cast.show(0.0)
+    shoulder, elbow, wrist = (joint(f"left_{p}") for p in ("upper_arm", "forearm", "hand"))
+    along = cast.position[0, wrist] - cast.position[0, shoulder]
+    rest, bend = cast.position[0, wrist].copy(), _elbow(cast, "left")
+    cast.strike(0, elbow, rest, 0.1 * along / np.linalg.norm(along))
+    for _ in range(30):
+        cast.show(1 / 60)
+        assert _elbow(cast, "left") == pytest.approx(bend, abs=1e-6)
+        assert np.isfinite(cast.wxyz).all()
+
+
+def test_many_hard_blows_turn_no_joint_out_of_its_bounds(library: Library):
+    joint = library.clips.skeleton.joint
+    cast = Cast(library, 1)
+    cast.place(0, 0, np.zeros(3))
+    cast.show(0.0)
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        for part in ("left_forearm", "right_upper_arm", "head", "left_hand"):
+            at = cast.position[0, joint(part)] + rng.normal(0, 0.1, 3)
+            cast.strike(0, joint(part), at, rng.normal(0, 0.5, 3))
+        cast.show(1 / 60)
+        assert np.isfinite(cast.wxyz).all()
+        turned = np.linalg.norm(cast._offsets.reaction[0], axis=1)
+        assert turned.max() <= MOST_GIVEN + 1e-9
+    for _ in range(120):
+        cast.show(1 / 60)
+    assert np.abs(cast._offsets.reaction).max() < 1e-4
 
 
 def test_a_waist_that_the_pelvis_carries_gives_way_too(library: Library):

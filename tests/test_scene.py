@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kumite import files
+from kumite.body import ARMS
 from kumite.clip import tip_positions
 from kumite.errors import KumiteError
 from kumite.graph import Library
@@ -82,6 +83,74 @@ def test_no_fist_skips_through_a_head_at_any_speed(speed):
     assert t >= 0
     if step / 2 > 0.15:
         assert (t - 0.5) * step == pytest.approx(-0.15, abs=0.05)
+
+
+HEAD, FOREARM, GLOVE = range(3)
+
+
+def _first_struck(aside: float = 0.0, *, throws: bool = False, arms: bool = True) -> int:
+    """What a fist meets on its way (0, 1.5, 0) → (0, 1.5, 1) to a head at z = 0.9.
+
+    Before the head, ``aside`` to its left, an upright forearm at z = 0.6 and its glove at z = 0.4.
+    """
+    places = [[0.0, 1.5, 0.9], [aside, 1.4, 0.6], [aside, 1.5, 0.4]]
+    shapes = crowd.Shapes(
+        np.zeros(3, int),
+        np.zeros((3, 3)),
+        np.zeros((3, 3)),
+        np.array([0.09, 0.04, 0.06]),
+        np.array([0.09, 0.04, 0.06]),
+        np.array([True, arms, arms]),
+        np.array([False, True, True]),
+        np.array([kernels.NO_LIMB, kernels.NO_LIMB, 0]),
+        np.zeros(4, int),
+        np.zeros((4, 3)),
+        np.full(4, 0.06),
+    )
+    blows = crowd.Blows(
+        np.zeros((2, 2, 4, 3)),
+        np.tile(np.array(places), (2, 2, 1, 1)),
+        np.tile(np.array([places[0], [aside, 1.6, 0.6], places[2]]), (2, 2, 1, 1)),
+        np.full((2, 4), kernels.NO_BLOW),
+        np.full((2, 4), kernels.NO_BLOW),
+        np.zeros((2, 4), bool),
+        np.full((2, 4), kernels.NO_HIT),
+        np.zeros((2, 4)),
+    )
+    blows.tip[:, 0, 1] = [[0.0, 1.5, 0.0], [0.0, 1.5, 1.0]]
+    blows.thrown[0, 1] = 7
+    if throws:
+        blows.thrown[1, 0] = 3
+    crowd.hit_one(0, 1, shapes, blows)
+    assert np.all(blows.part[0, [0, 2, 3]] == kernels.NO_HIT)
+    return int(blows.part[0, 1])
+
+
+@pytest.mark.jit_off
+def test_a_blow_spends_itself_on_what_it_meets_first():
+    assert _first_struck(arms=False) == HEAD
+    assert _first_struck() == GLOVE
+    # Two fists on their way do not meet, but a forearm is struck though its fist is on its way.
+    assert _first_struck(throws=True) == FOREARM
+    # Met at 30° from square: blocked. At 53°, or not at all: it goes on to the head.
+    assert _first_struck(0.06) == GLOVE
+    assert _first_struck(0.096) == HEAD
+    assert _first_struck(0.5) == HEAD
+
+
+@pytest.mark.jit_off
+@pytest.mark.parametrize("degrees", [0.0, 30.0, 60.0, 120.0])
+def test_how_squarely_a_moving_arm_is_met(degrees):
+    """Only the way of one with respect to the other counts."""
+    a, b, drift = np.zeros(3), np.array([0.0, 0.3, 0.0]), np.array([0.3, -0.1, 0.2])
+    angle = np.radians(degrees)
+    p = np.array([0.1 * np.sin(angle), 0.2, -0.1 * np.cos(angle)])
+    way = np.array([0.0, 0.0, 0.4])
+    still = kernels.squareness(0.0, p, p + way, a, a, b, b)
+    both = kernels.squareness(
+        0.5, p - way / 2, p + way / 2 + 2 * drift, a, a + 2 * drift, b, b + 2 * drift
+    )
+    assert still == pytest.approx(np.cos(angle)) and both == pytest.approx(np.cos(angle))
 
 
 # Scene files -------------------------------------------------------------------------------------
@@ -244,7 +313,8 @@ def test_hits_are_where_a_fist_and_a_body_are(fight: Recording, sparring: LiveSc
         fist = tip_positions(fight.skeleton, e.data["limb"], position, world)[0]
         moved = e.data["speed"] / fight.fps
         assert np.linalg.norm(fist - e.data["place"]) < 0.12 + 2 * moved
-        assert e.data["part"] in ("head", "neck", "chest", "waist")
+        trunk = ("head", "neck", "chest", "waist")
+        assert e.data["part"] in (ARMS if e.data["blocked"] else trunk)
         assert e.data["victim"] != e.character
         assert (e.frame - 1) / fight.fps <= e.data["time"] + 1e-3 <= e.frame / fight.fps + 2e-3
 
@@ -256,6 +326,20 @@ def test_a_blow_lands_once(fight: Recording):
             key = (e.character, e.data["limb"], e.data["blow"])
             assert e.frame - last.get(key, -1000) > 5
             last[key] = e.frame
+
+
+def test_a_blow_lands_or_is_blocked_never_both(fight: Recording):
+    """Arms stop some blows of a fight, not all; what an arm stopped does not land behind it."""
+    blocked = [e for e in fight.events if e.kind == "hit" and e.data["blocked"]]
+    landed = [e for e in fight.events if e.kind == "hit" and not e.data["blocked"]]
+    assert blocked and landed
+    for e in blocked:
+        assert not any(
+            (f.character, f.data["limb"], f.data["blow"])
+            == (e.character, e.data["limb"], e.data["blow"])
+            and abs(f.frame - e.frame) <= 5
+            for f in landed
+        )
 
 
 def test_a_struck_body_shows_it(library: Library):
@@ -414,7 +498,11 @@ def _standing(positions: list[list[float]], yaws: list[float], frames: int = 31)
         wxyz,
         np.ones((frames, count, 2), bool),
         np.tile(np.arange(frames)[:, None], (1, count)),
-        events=(Event(3, "strike", "a", {}), Event(5, "hit", "a", {})),
+        events=(
+            Event(3, "strike", "a", {}),
+            Event(5, "hit", "a", {}),
+            Event(8, "hit", "a", {"part": "left_forearm", "blocked": True}),
+        ),
         settings={"aims_at": {"a": "b", "b": "a"}, "source_skate_m_s": 0.5},
     )
 
@@ -423,7 +511,7 @@ def test_metrics_of_a_scene_worked_by_hand():
     m = measure(_standing([[0, 0], [0, 2]], [0.0, 0.0]))
     a, b = m.characters
     assert m.min_separation_m == pytest.approx(2.0)
-    assert (a.thrown, a.landed, b.thrown) == (1, 1, 0)
+    assert (a.thrown, a.landed, a.blocked, b.thrown) == (1, 1, 1, 0)
     assert a.skate_m_s == pytest.approx(1.0, rel=1e-5) and a.skate_ratio == pytest.approx(2.0)
     assert b.skate_m_s == 0
     assert a.facing_share == 1.0 and b.facing_share == 0.0  # b looks away

@@ -319,6 +319,12 @@ def _landed(folder: Path) -> float:
     return min(c.landed for m in _fights(folder) for c in m.characters) * 10 / SPARRING_SECONDS
 
 
+@_figure("sparring: blows blocked by arms, a boxer's mean", "blows/10 s")
+def _blocked(folder: Path) -> float:
+    every = [c.blocked for m in _fights(folder) for c in m.characters]
+    return sum(every) / len(every) * 10 / SPARRING_SECONDS
+
+
 @_figure("sparring: foot skate over the source's, worst", "ratio", 1.5)
 def _skate(folder: Path) -> float:
     return max(c.skate_ratio or 0.0 for m in _fights(folder) for c in m.characters)

@@ -2,9 +2,10 @@
 
 from kumite.body.mesh import ROLES, BodyMesh, body_mesh, skin_vertices
 from kumite.body.palette import PALETTES, Palette, palette
-from kumite.body.segments import PARTS, Body, lay_body
+from kumite.body.segments import ARMS, PARTS, Body, lay_body
 
 __all__ = [
+    "ARMS",
     "PALETTES",
     "PARTS",
     "ROLES",

@@ -46,6 +46,8 @@ PARTS = (
     "pelvis",
     *(f"{side}_{part}" for side in SIDES for part in _SIDED),
 )
+ARMS = tuple(f"{side}_{part}" for side in SIDES for part in ("upper_arm", "forearm", "hand"))
+"""Parts that guard: a blow that they stop is blocked."""
 
 # Radii as fractions of the stature, at the start and end of each capsule: girths of ANSUR II's
 # median man divided by 2π, hands with a 10 oz glove.

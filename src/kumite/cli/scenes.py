@@ -101,8 +101,8 @@ def _show_metrics(metrics: Any, as_json: bool) -> None:
         print_json(metrics.to_json())
         return
     table = Table(title=f"{metrics.seconds:.1f} s")
-    columns = ("", "thrown", "landed", "skate m/s", "of source", "facing", "join jump m/s", "joins")
-    for column in (*columns, "variety"):
+    columns = ("", "thrown", "landed", "blocked", "skate m/s", "of source", "facing")
+    for column in (*columns, "join jump m/s", "joins", "variety"):
         table.add_column(column, justify="right")
     shown = metrics.characters if len(metrics.characters) <= MOST_SHOWN else ()
     for c in shown:
@@ -112,6 +112,7 @@ def _show_metrics(metrics: Any, as_json: bool) -> None:
             c.name,
             str(c.thrown),
             str(c.landed),
+            str(c.blocked),
             f"{c.skate_m_s:.3f}",
             ratio,
             facing,
@@ -126,6 +127,7 @@ def _show_metrics(metrics: Any, as_json: bool) -> None:
         out.print(
             f"{metrics.seconds:.1f} s, {len(many)} characters: "
             f"{sum(c.thrown for c in many)} blows thrown, {sum(c.landed for c in many)} landed, "
+            f"{sum(c.blocked for c in many)} blocked, "
             f"{sum(c.landed > 0 for c in many)} of them landed one; worst skate "
             f"{max(c.skate_m_s for c in many):.3f} m/s, worst jump at a join "
             f"{max(c.join_jump_m_s for c in many):.2f} m/s"

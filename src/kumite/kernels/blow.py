@@ -9,6 +9,8 @@ from kumite.kernels.jit import kernel
 NO_HIT = -1
 NO_BLOW = -1
 NOBODY = -1
+NO_LIMB = -1
+SQUARELY = np.cos(np.radians(45.0))  # how a blow must meet an arm; else it glances off
 REFINEMENTS = 8  # halvings of the step in which contact begins
 
 
@@ -65,3 +67,25 @@ def swept_contact(p0, p1, a0, a1, b0, b1, radius_a, radius_b, radius):
             return t
         apart = t
     return -1.0
+
+
+@kernel
+def squareness(t, p0, p1, a0, a1, b0, b1):
+    """Cosine between a moving sphere's way into a moving capsule and the skin's normal, at t."""
+    a, way, out = np.empty(3), np.empty(3), np.empty(3)
+    ab2 = ap = 0.0
+    for c in range(3):
+        a[c] = a0[c] + t * (a1[c] - a0[c])
+        out[c] = p0[c] + t * (p1[c] - p0[c]) - a[c]
+        ab = b0[c] + t * (b1[c] - b0[c]) - a[c]
+        ab2 += ab * ab
+        ap += ab * out[c]
+    u = min(max(ap / ab2, 0.0), 1.0) if ab2 > 1e-12 else 0.0
+    into = way2 = out2 = 0.0
+    for c in range(3):
+        out[c] -= u * (b0[c] + t * (b1[c] - b0[c]) - a[c])
+        way[c] = (p1[c] - p0[c]) - (1.0 - u) * (a1[c] - a0[c]) - u * (b1[c] - b0[c])
+        into -= way[c] * out[c]
+        way2 += way[c] * way[c]
+        out2 += out[c] * out[c]
+    return into / np.sqrt(way2 * out2 + 1e-18)

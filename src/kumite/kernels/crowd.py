@@ -11,7 +11,15 @@ from typing import NamedTuple
 import numpy as np
 from numba import prange
 
-from kumite.kernels.blow import NO_BLOW, NO_HIT, NOBODY, swept_contact
+from kumite.kernels.blow import (
+    NO_BLOW,
+    NO_HIT,
+    NO_LIMB,
+    NOBODY,
+    SQUARELY,
+    squareness,
+    swept_contact,
+)
 from kumite.kernels.character import begin, planar_point, show_one, turned
 from kumite.kernels.jit import kernel, parallel_kernel
 from kumite.kernels.look_ahead import look_ahead, look_further
@@ -227,7 +235,9 @@ class Shapes(NamedTuple):
     end: np.ndarray
     radius_start: np.ndarray  # [B] m
     radius_end: np.ndarray
-    target: np.ndarray  # [B] bool, what counts as hit
+    target: np.ndarray  # [B] bool, what can be struck
+    guard: np.ndarray  # [B] bool, an arm: it must be struck squarely
+    limb: np.ndarray  # [B] the limb that strikes with the part, or NO_LIMB
     tip_joint: np.ndarray  # [4]
     tip_offset: np.ndarray  # [4, 3] centre of the fist's sphere
     tip_radius: np.ndarray  # [4] m
@@ -307,7 +317,11 @@ def throw_one(k, blow_of_frame, f, blows):
 
 @kernel
 def hit_one(k, victim, shapes, blows):
-    """Which blows of character k touch the victim's target parts during this frame; how many."""
+    """What each blow of character k touches first of its victim in this frame; how many do.
+
+    A glove that throws a blow of its own is passed by: two fists on their way do not meet. A blow
+    that does not meet an arm squarely glances off and goes on to what is behind.
+    """
     count = 0
     for s in range(4):
         blows.when[k, s] = 2.0
@@ -315,20 +329,26 @@ def hit_one(k, victim, shapes, blows):
         if victim == NOBODY or blow == NO_BLOW or blow == blows.landed[k, s]:
             continue
         for p in range(shapes.target.shape[0]):
-            if not shapes.target[p]:
+            own = shapes.limb[p]
+            if not shapes.target[p] or (own != NO_LIMB and blows.thrown[victim, own] != NO_BLOW):
                 continue
+            p0, p1 = blows.tip[0, k, s], blows.tip[1, k, s]
+            a0, a1 = blows.a[0, victim, p], blows.a[1, victim, p]
+            b0, b1 = blows.b[0, victim, p], blows.b[1, victim, p]
             t = swept_contact(
-                blows.tip[0, k, s],
-                blows.tip[1, k, s],
-                blows.a[0, victim, p],
-                blows.a[1, victim, p],
-                blows.b[0, victim, p],
-                blows.b[1, victim, p],
+                p0,
+                p1,
+                a0,
+                a1,
+                b0,
+                b1,
                 shapes.radius_start[p],
                 shapes.radius_end[p],
                 shapes.tip_radius[s],
             )
-            if t >= 0.0 and t < blows.when[k, s]:
+            if t < 0.0 or t >= blows.when[k, s]:
+                continue
+            if not shapes.guard[p] or squareness(t, p0, p1, a0, a1, b0, b1) >= SQUARELY:
                 blows.when[k, s] = t
                 blows.part[k, s] = p
         count += blows.part[k, s] != NO_HIT

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kumite.body import lay_body
+from kumite.body import ARMS, lay_body
 from kumite.clip import LIMBS
 from kumite.control import (
     BEHAVIOURS,
@@ -25,7 +25,7 @@ from kumite.errors import KumiteError, unknown
 from kumite.graph import Library
 from kumite.kernels import crowd as kernels
 from kumite.kernels import near
-from kumite.kernels.blow import NO_BLOW, NO_HIT, NOBODY, swept_contact
+from kumite.kernels.blow import NO_BLOW, NO_HIT, NO_LIMB, NOBODY, swept_contact
 from kumite.kernels.character import MANY
 from kumite.rotation import rotate
 from kumite.scene.memory import refuse_too_many
@@ -35,7 +35,7 @@ from kumite.scene.settings import NEAREST, SceneSettings
 from kumite.scene.stage import SceneObject
 from kumite.synthesis import Cast
 
-TARGET_PARTS = ("head", "neck", "chest", "waist")
+TARGET_PARTS = ("head", "neck", "chest", "waist", *ARMS)
 AIM = "head"
 CLOSEST = 0.40  # m between two pelvises under which bodies are pushed apart
 PUSH_SPEED = 0.5  # m/s, at most, of that push: slow enough not to be seen as a jump
@@ -183,6 +183,8 @@ class LiveScene:
             body.radius_start,
             body.radius_end,
             np.array([p in TARGET_PARTS for p in body.parts]),
+            np.array([p in ARMS for p in body.parts]),
+            np.array([LIMBS.index(p) if p in LIMBS else NO_LIMB for p in body.parts]),
             np.array(joints),
             np.array(offsets),
             np.array(radii),
@@ -370,6 +372,7 @@ class LiveScene:
             speed=round(float(np.linalg.norm(velocity)), 4),
             place=[round(float(x), 4) for x in place],
             time=round((self.frame - 1 + t) / self.fps, 4),
+            blocked=part in ARMS and part != victim,
             blow=int(self._blows.thrown[k, s]),
         )
 

@@ -19,7 +19,8 @@ FACING_WITHIN = np.radians(45.0)
 class CharacterMetrics:
     name: str
     thrown: int  # blows thrown
-    landed: int  # blows that touched the target
+    landed: int  # blows that struck the head or trunk of the one aimed at, or the thing aimed at
+    blocked: int  # blows that an arm of the one aimed at stopped
     skate_m_s: float  # mean speed over the ground of a planted foot
     skate_ratio: float | None  # over the same of the captured clips
     facing_share: float | None  # share of frames facing the one aimed at within 45°
@@ -111,7 +112,8 @@ def measure(recording: Recording) -> Metrics:
             CharacterMetrics(
                 name,
                 sum(e.kind == "strike" for e in mine),
-                sum(e.kind == "hit" for e in mine),
+                sum(e.kind == "hit" and not e.data.get("blocked") for e in mine),
+                sum(e.kind == "hit" and bool(e.data.get("blocked")) for e in mine),
                 skate,
                 skate / source if source else None,
                 share,

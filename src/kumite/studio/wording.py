@@ -54,6 +54,8 @@ def describe(event: Event) -> str:
             said += f" → {_words(part if whom is None else whom)}"
         if isinstance(speed, int | float):
             said += f", {speed:.1f} m/s"
+        if data.get("blocked"):
+            said += ", blocked"
         return said
     rest = [
         _number(v) if k in ("action", "label", "name", "kind") else f"{_words(k)} {_number(v)}"
@@ -97,7 +99,8 @@ class EventLog:
                 self._loud.append(event)
             if event.kind == "strike" and event.character in self.thrown:
                 self.thrown[event.character] += 1
-            if event.kind == "hit" and event.character in self.landed:
+            landed = event.kind == "hit" and not event.data.get("blocked")
+            if landed and event.character in self.landed:
                 self.landed[event.character] += 1
 
     @property
@@ -133,7 +136,7 @@ def _line_html(event: Event, fps: float, names: Sequence[str], faded: float) -> 
     said = describe(event)
     if event.kind not in ("strike", "hit"):
         said = f"{_words(event.kind)}: {said}" if said else _words(event.kind)
-    weight = 600 if event.kind == "hit" else 400
+    weight = 600 if event.kind == "hit" and not event.data.get("blocked") else 400
     cell = "white-space:nowrap;vertical-align:top;padding-right:.5em"
     return (
         f'<tr style="opacity:{1 - faded:.2f}">'
