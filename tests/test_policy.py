@@ -397,6 +397,31 @@ def test_a_behaviour_counts_only_in_its_active_region(library: Library):
     assert mind.choices.worth[0] == 0
 
 
+def test_striking_counts_only_while_the_target_is_in_reach(library: Library):
+    """What is said of its reach is what is so: at its rim and beyond, striking is worth nothing."""
+    behaviour = strike(library)
+    assert 1.2 < behaviour.farthest < 2.0
+    assert strike(library, farthest=0.8).farthest == 0.8
+    assert strike(library, limbs=("left_hand",)).farthest <= behaviour.farthest
+    everywhere = replace(behaviour, farthest=np.inf)
+    far = np.full((1, 1, 2), 1e6)
+    tracks, near = stretch_tracks(library), solve(library, approach())
+    worths = []
+    for said in (behaviour, everywhere):
+        skill = Skill(library, near, solve(library, said), tracks)
+        mind = Fighters(skill, [Temper(0.0, 6.0, facing=0.0)], 0)
+        worths.append([])
+        for state in range(0, library.table.states, 5):
+            for away in (0.7, behaviour.farthest - 0.01, behaviour.farthest + 0.01, 3.0):
+                for yaw in np.linspace(-np.pi, np.pi, 7):
+                    target = np.array([[away * np.sin(yaw), 1.5, away * np.cos(yaw)]])
+                    mind.pick(0, state, target, far)
+                    worths[-1].append((away, mind.choices.worth[0]))
+    assert worths[0] == worths[1]
+    assert max(w for away, w in worths[0] if away < 1.0) > 0
+    assert all(w == 0 for away, w in worths[0] if away > behaviour.farthest)
+
+
 def test_behaviours_that_make_no_sense_are_refused():
     grid = approach_grid()
     with pytest.raises(KumiteError, match="unknown behaviour 'dance'"):

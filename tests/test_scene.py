@@ -421,6 +421,49 @@ def test_a_boxer_goes_for_the_target_wherever_it_is_put(library: Library):
         assert sum(e.kind == "hit" for e in scene.events) > before, place
 
 
+def _run(scene: LiveScene, seconds: float) -> tuple[np.ndarray, np.ndarray, int]:
+    """Over a time: where the boxer is [F, 2] on the ground, how far off the target [F], hits."""
+    before, ground = sum(e.kind == "hit" for e in scene.events), []
+    for _ in range(int(seconds * scene.fps)):
+        scene.step()
+        ground.append(scene.root_position[0, [0, 2]])
+    way = np.array(ground)
+    gap = np.linalg.norm(way - scene.objects[0].position[[0, 2]], axis=1)
+    return way, gap, sum(e.kind == "hit" for e in scene.events) - before
+
+
+def test_a_target_dragged_behind_is_turned_to_and_hit(library: Library):
+    scene = LiveScene(load_scene("target"), library, seed=0)
+    scene.move_object("target", np.array([0.0, 1.5, -1.5]))
+    _, gap, hits = _run(scene, 20.0)
+    assert gap[-1] < 1.0 and hits >= 1
+
+
+@pytest.mark.parametrize("height", [0.0, 0.3, 2.6, 50.0])
+def test_a_target_at_a_height_of_no_blow_is_approached_and_kept_near(library: Library, height):
+    scene = LiveScene(load_scene("target"), library, seed=1)
+    scene.move_object("target", np.array([0.5, height, 1.5]))
+    way, gap, hits = _run(scene, 16.0)
+    late = len(way) // 2
+    assert hits == 0 and gap[late:].max() < 1.0
+    # Nobody stands still: he decides, and his feet carry him about it.
+    assert np.linalg.norm(np.diff(way[late:], axis=0), axis=1).sum() > 0.4
+    assert sum(e.kind == "decision" for e in scene.events) >= 10
+
+
+def test_a_target_out_of_every_grid_is_walked_to(library: Library):
+    scene = LiveScene(load_scene("target"), library, seed=0)
+    place = np.array([-3.5, 1.5, -3.5])
+    policies = scene.skill.policies
+    assert not any(p.behaviour.grid.contains(place) for p in policies)
+    assert np.hypot(3.5, 3.5) > scene.skill.strike.behaviour.farthest
+    scene.move_object("target", place)
+    _, gap, hits = _run(scene, 30.0)
+    fifth = len(gap) // 5
+    assert np.all(np.diff(gap[: 3 * fifth : fifth]) < -0.5)
+    assert gap.min() < 1.0 and hits >= 1
+
+
 def test_a_struck_target_swings_and_comes_back(library: Library):
     scene = LiveScene(load_scene("target"), library, seed=0)
     home = scene.objects[0].position.copy()

@@ -163,8 +163,19 @@ def approach(**changes) -> Behaviour:
 
 
 def strike(library: Library, **changes) -> Behaviour:
-    """Hit the target, fast (A6, A7). The grid is the bounding volume of the library's hits."""
-    return Behaviour("strike", strike_grid(library.strikes.points), **changes)
+    """Hit the target, fast (A6, A7). The grid is the bounding volume of the library's hits.
+
+    It counts only while the target is in reach, :attr:`Behaviour.farthest`: no farther off than an
+    action of the library strikes, or ends where the next one may. Beyond, it is worth nothing.
+    """
+    changes.setdefault("grid", strike_grid(library.strikes.points))
+    found = Behaviour("strike", **changes)
+    if "farthest" in changes:
+        return found
+    tracks = stretch_tracks(library, found.limbs)
+    blow = np.hypot(tracks.tip[:, 0], tracks.tip[:, 2]).max(initial=0.0) + found.tolerance
+    step = np.hypot(*library.table.displacement[:, :2].T).max(initial=0.0) + found.grid.high[1]
+    return replace(found, farthest=float(max(blow, step)))
 
 
 @dataclass(frozen=True)
