@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -286,6 +287,102 @@ def test_bad_input_ends_with_status_2_and_leaves_nothing(kumite, built, tmp_path
     assert status == 2 and expected in err and "Traceback" not in err
     left = {p.name for p in tmp_path.iterdir()} - {"still.bvh", "cache"}
     assert not left
+
+
+NOBODY_TO_HIT = """title = "Alone"
+[[character]]
+name = "red"
+position = [0, 0]
+aims_at = "ball"
+[[object]]
+name = "ball"
+position = [0, 1.5, 1]
+"""
+CROWD = 'title = "Many"\n[crowd]\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (
+            NOBODY_TO_HIT.replace("[[obj", "behaviours = { cirle = 1 }\n[[obj"),
+            "error: unknown behaviour 'cirle'; did you mean 'circle' or 'circle_back'? (expected",
+        ),
+        (
+            NOBODY_TO_HIT.replace("[[obj", "behaviours = { strike = 1 }\n[[obj"),
+            "error: behaviours: strike has a weight of its own",
+        ),
+        (
+            NOBODY_TO_HIT.replace("[[obj", "approach = 0\nstrike = 0\n[[obj"),
+            "error: s.toml:2: character.0: all weights are 0; expected approach, strike or another",
+        ),
+        (CROWD + "approach = 0\nstrike = 0\n", "error: s.toml:2: crowd: all weights are 0"),
+        (CROWD + "behaviours = { cirle = 1 }\n", "error: unknown behaviour 'cirle'"),
+        (CROWD + "count = 0\n", "error: s.toml:3: crowd.count: 0; expected greater than or equal"),
+        (
+            CROWD + "count = 1000000\n",
+            "error: s.toml:2: crowd: count: 1000000 at a spacing of 1.5 m do not find room within",
+        ),
+        (CROWD + "count = 2000000\n", "error: s.toml:3: crowd.count: 2000000; expected less than"),
+        (
+            NOBODY_TO_HIT.replace("1.5, 1]", "1.5, 2000]"),
+            "error: s.toml:8: object.0.position.2: 2000; expected less than or equal to 1000",
+        ),
+        (NOBODY_TO_HIT.replace("1.5, 1]", "nan, 1]"), "error: s.toml:8: object.0.position.1: nan"),
+    ],
+)
+def test_a_scene_that_cannot_be_run_is_one_line(kumite, built, tmp_path, text, expected):
+    (tmp_path / "s.toml").write_text(text)
+    status, _, err = kumite("run", "s.toml", "-l", built, "--seconds", "1", "-o", "x.rec")
+    said = [line for line in err.splitlines() if line.startswith("error: ")]
+    assert status == 2 and len(said) == 1 and expected in said[0] and "Traceback" not in err
+    assert not (tmp_path / "x.rec").exists()
+
+
+@pytest.mark.parametrize("count", ["0", "-3", "1"])
+def test_a_count_below_two_is_refused(kumite, built, count):
+    status, _, err = kumite("run", "crowd", "-l", built, "--count", count)
+    assert status == 2 and f"error: count: {count}, expected at least 2" in err
+
+
+@pytest.mark.parametrize(
+    ("count", "free", "expected"),
+    [
+        (
+            "950000",
+            1e12,
+            "error: count: 950000 at a spacing of 1.5 m do not find room within 1000 m; exp",
+        ),
+        ("600000", 1e9, "error: count: 600000 characters do not fit into memory; at most "),
+    ],
+)
+def test_a_count_beyond_room_or_memory_is_refused(
+    kumite, built, monkeypatch, count, free, expected
+):
+    monkeypatch.setattr("kumite.scene.memory.free_memory", lambda: float(free))
+    status, _, err = kumite("run", "crowd", "-l", built, "--count", count)
+    assert status == 2 and expected in err
+
+
+@pytest.mark.parametrize("scene", ["sparring", "target", "crowd"])
+def test_a_library_without_blows_is_refused(kumite, library: Library, tmp_path, scene):
+    """Walking people, say: nobody in it can strike, so no scene is run with it."""
+    strikes = library.strikes
+    rows = {f: getattr(strikes, f)[:0] for f in ("frame", "limb", "start", "stop", "velocity")}
+    none = replace(strikes, effective=np.zeros_like(strikes.effective), **rows)
+    save_library(tmp_path / "walk.kumite", replace(library, strikes=none))
+    status, _, err = kumite("run", scene, "-l", "walk.kumite", "--seconds", "1")
+    assert status == 2 and "error: the library holds no effective hits: nobody in it can" in err
+
+
+def test_a_target_out_of_every_grid_is_walked_to(kumite, built, tmp_path):
+    """The stated fallback: it counts as standing on the rim of the approach grid."""
+    (tmp_path / "far.toml").write_text(NOBODY_TO_HIT.replace("1.5, 1]", "1.5, 900]"))
+    status, *_ = kumite("run", "far.toml", "-l", built, "--seconds", "8", "-o", "far.rec")
+    from kumite.scene import load_recording
+
+    way = load_recording(tmp_path / "far.rec").root_position[:, 0, 2]
+    assert status == 0 and way[-1] - way[0] > 1.0
 
 
 def test_a_damaged_or_other_version_of_a_library(kumite, built: Path, tmp_path: Path):

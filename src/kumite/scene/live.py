@@ -141,7 +141,7 @@ class LiveScene:
         names = {n: None for c in self.settings.characters for n in c.behaviours} | dict.fromkeys(
             own
         )
-        known = [*BEHAVIOURS, *own]
+        known = [n for n in [*BEHAVIOURS, *own] if n not in ("approach", "strike")]
         out = []
         for name in names:
             if name in ("approach", "strike"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
+from collections import Counter
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
@@ -15,7 +16,8 @@ from kumite import toml
 from kumite.errors import KumiteError
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Metres = Annotated[float, Field(ge=-1000, le=1000)]  # recordings keep single precision
+FARTHEST = 1000.0  # m: recordings keep single precision
+Metres = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
 Name = Annotated[str, Field(min_length=1, max_length=60)]
 Weight = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 NEAREST = "nearest"  # aims at the nearest character that is free
@@ -41,9 +43,13 @@ class CharacterSettings(_Settings):
 
     @model_validator(mode="after")
     def _some_weight(self) -> CharacterSettings:
-        if self.approach + self.strike + sum(self.behaviours.values()) == 0:
-            raise ValueError("all weights are 0; expected approach, strike or another above 0")
+        _refuse_no_weight(self)
         return self
+
+
+def _refuse_no_weight(of: CharacterSettings | CrowdSettings) -> None:
+    if of.approach + of.strike + sum(of.behaviours.values()) == 0:
+        raise ValueError("all weights are 0; expected approach, strike or another above 0")
 
 
 class ObjectSettings(_Settings):
@@ -67,8 +73,27 @@ class CrowdSettings(_Settings):
     again: Annotated[int, Field(ge=1, le=50)] = 1  # a crowd decides in a fifth of the time
     personal_space: Annotated[Finite, Field(ge=0, le=3)] = 0.7
 
+    @model_validator(mode="after")
+    def _some_weight(self) -> CrowdSettings:
+        _refuse_no_weight(self)
+        try:
+            self.refuse_too_wide()
+        except KumiteError as error:  # said with its line, as all that is wrong with a file
+            raise ValueError(str(error)) from None
+        return self
+
+    def refuse_too_wide(self) -> None:
+        """Errors: more than find room."""
+        most = 2 * int(FARTHEST / self.spacing - 1.0) ** 2
+        if self.count > most:
+            raise KumiteError(
+                f"count: {self.count} at a spacing of {self.spacing:g} m do not find room within "
+                f"{FARTHEST:g} m; expected at most {most}"
+            )
+
     def characters(self) -> tuple[CharacterSettings, ...]:
-        """Pairs on a square lattice, face to face."""
+        """Pairs on a square lattice, face to face. Errors: more than find room."""
+        self.refuse_too_wide()  # a count given beside the file was not checked with it
         pairs = (self.count + 1) // 2
         across = max(1, round(pairs**0.5))
         shared = self.model_dump(exclude={"count", "spacing"})
@@ -107,7 +132,7 @@ class SceneSettings(_Settings):
         if not self.character and self.crowd is None:
             raise ValueError("nobody is in it; expected a [[character]] or a [crowd]")
         names = [c.name for c in self.characters] + [o.name for o in self.object]
-        twice = sorted({n for n in names if names.count(n) > 1})
+        twice = sorted(n for n, times in Counter(names).items() if times > 1)
         if twice:
             raise ValueError(f"names used twice: {', '.join(twice)}")
         for c in self.character:
