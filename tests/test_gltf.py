@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from kumite.body import body_mesh, skin_vertices
-from kumite.clip import forward_kinematics
+from kumite.clip import forward_kinematics, resample
+from kumite.errors import KumiteError
 from kumite.export.gltf import write_glb
 from kumite.rotation import exp
 from kumite.scene import Recording
@@ -176,6 +177,37 @@ def test_a_recording_in_which_nothing_moves(recording: Recording, tmp_path: Path
     }
     used |= {s["inverseBindMatrices"] for s in document["skins"]}
     assert used == set(range(len(document["accessors"])))
+
+
+@pytest.mark.parametrize("fps", [12.0, 60.0])
+def test_another_rate(recording: Recording, tmp_path: Path, fps: float):
+    """The keys of each character are those of its clip resampled, and the ball keeps its pace."""
+    write_glb(tmp_path / "rate.glb", recording, fps=fps)
+    document, binary = parse(tmp_path / "rate.glb")
+    times = read(document, binary, document["animations"][0]["samplers"][0]["input"])[:, 0]
+    assert np.allclose(np.diff(times), 1 / fps, atol=1e-6)
+    assert recording.seconds - 2 / 12 <= times[-1] <= recording.seconds
+    key = len(times) - 2
+    world = worlds(document, binary, key)
+    for k, name in enumerate(recording.names):
+        clip = resample(recording.clip(name), fps)
+        assert len(clip) == len(times)
+        position, _ = forward_kinematics(clip.skeleton, clip.root_position, clip.wxyz)
+        got = np.array([world[j][:3, 3] for j in document["skins"][k]["joints"]])
+        assert np.allclose(got, position[key], atol=1e-4)
+    (ball,) = (n for n, node in enumerate(document["nodes"]) if node["name"] == "ball")
+    assert np.allclose(world[ball][:3, 3], 0.01 + 0.3 * times[key], atol=1e-5)
+
+
+def test_what_cannot_be_written(recording: Recording, tmp_path: Path):
+    bad = recording.wxyz.copy()
+    bad[3, 0, 0, 0] = np.nan
+    with pytest.raises(KumiteError, match="not finite"):
+        write_glb(tmp_path / "bad.glb", replace(recording, wxyz=bad))
+    for fps, message in ((0.0, "more than 0"), (float("nan"), "more than 0"), (1e9, "at most")):
+        with pytest.raises(KumiteError, match=message):
+            write_glb(tmp_path / "bad.glb", recording, fps=fps)
+    assert not list(tmp_path.iterdir())
 
 
 def test_same_recording_same_bytes(recording: Recording, written: Path, tmp_path: Path):

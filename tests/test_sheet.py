@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from PIL import Image
 
+from kumite.body import body_mesh, palette
+from kumite.clip import forward_kinematics
 from kumite.errors import KumiteError
 from kumite.export.plot import plot_hits
-from kumite.export.sheet import contact_sheet, recording_sheet
+from kumite.export.sheet import (
+    BACKGROUND,
+    FLOOR,
+    _cameras,
+    body_shape,
+    contact_sheet,
+    look,
+    recording_sheet,
+    render,
+)
 from kumite.graph import Library
 from kumite.kernels.raster import draw_triangles
 from kumite.scene import LiveScene, load_scene, record
@@ -38,6 +51,55 @@ def test_a_recording_is_drawn(library: Library, tmp_path):
     scene = LiveScene(load_scene("target"), library)
     recording_sheet(tmp_path / "r.png", record(scene, 1.0), size=(120, 100))
     assert Image.open(tmp_path / "r.png").size[0] > 300
+
+
+def test_feet_stand_on_the_floor_and_the_figure_fills_the_cell():
+    """A figure of known height seen from the front covers the pixels the camera says it must."""
+    skeleton, root, wxyz = _still()
+    position, world = forward_kinematics(skeleton, root[0], wxyz[0])
+    camera = look(np.array([0.0, 1.0, 0.0]), 0.0, 0.0, 2.5, (200, 250))
+    shape = body_shape(body_mesh(skeleton), skeleton, position[0], world[0], palette(0))
+    xy, near = camera.project(shape.vertices)
+    assert (near > 0).all()
+    image = render(camera, [shape]).astype(int)
+    red = np.argwhere(image[..., 0] - image[..., 2] > 60)
+    assert red[:, 1].min() >= xy[:, 0].min() - 1 and red[:, 1].max() <= xy[:, 0].max() + 1
+    # 2.5 m over 250 pixels: a pixel is a centimetre, and height 0 is 100 pixels below the middle.
+    assert np.allclose(camera.project(np.zeros((1, 3)))[0], [[100, 225]])
+
+
+@pytest.mark.parametrize("deep", [3.0, 30.0, 200.0])
+def test_the_floor_is_seen_under_the_farthest_figure(deep: float):
+    """However far a crowd goes back: haze begins behind it, and ends."""
+    skeleton, root, wxyz = _still()
+    crowd = np.repeat(root[:1], 3, axis=1)
+    crowd[0, :, [0, 2]] = [[0.0, 0.0, 2.0], [0.0, -deep, 0.0]]
+    rotations = np.repeat(wxyz[:1], 3, axis=1)
+    (camera,) = _cameras(skeleton, crowd, rotations, "front", (160, 120), follow=True)
+    image = render(camera, []) / 255.0
+
+    feet = crowd[0] * [1.0, 0.0, 1.0]
+    away = (camera.eye - feet) @ camera.axes[2]
+    ((x, y),), _ = camera.project(feet[[away.argmax()]] + [0.3, 0.0, 0.0])
+    seen = image[int(y), int(x)]
+    assert np.abs(seen - FLOOR).max() < np.abs(seen - BACKGROUND).max()
+
+
+def test_what_does_not_fit_is_said(tmp_path):
+    skeleton, root, wxyz = _still()
+    good = (skeleton, root, wxyz)
+    cases: tuple[tuple[tuple, list[int], dict[str, Any], str], ...] = (
+        ((skeleton, root[:, 0], wxyz), [0], {}, "expected"),
+        (good, [], {}, "expected some of 0 … 3"),
+        (good, [4], {}, "expected some of 0 … 3"),
+        (good, [0], {"labels": ["a", "b"]}, "2 labels for 1 frames"),
+        (good, [0], {"colours": []}, "colours for 0 of 1"),
+        (good, [0], {"columns": 0}, "0 columns"),
+    )
+    for data, frames, more, message in cases:
+        with pytest.raises(KumiteError, match=message):
+            contact_sheet(tmp_path / "a.png", *data, frames, **more)
+    assert not list(tmp_path.iterdir())
 
 
 def test_views_that_do_not_exist(tmp_path):

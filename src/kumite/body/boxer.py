@@ -36,17 +36,17 @@ MODEL_HIP = 0.090  # m, half the distance between the hip joints
 TRUNK = (
     (0.26, 0.100, 0.060, 0.060),
     (0.27, 0.138, 0.096, 0.088),
-    (0.36, 0.138, 0.100, 0.088),
-    (0.48, 0.143, 0.106, 0.094),
-    (0.62, 0.155, 0.115, 0.106),
-    (0.74, 0.165, 0.123, 0.114),
-    (0.84, 0.170, 0.126, 0.118),
-    (0.92, 0.168, 0.116, 0.117),
-    (1.00, 0.158, 0.096, 0.111),
-    (1.07, 0.130, 0.076, 0.099, -0.004),
-    (1.13, 0.098, 0.062, 0.086, -0.008),
-    (1.19, 0.071, 0.056, 0.074, -0.010),
-    (1.21, 0.062, 0.050, 0.066, -0.010),
+    (0.36, 0.139, 0.100, 0.088),
+    (0.48, 0.145, 0.106, 0.094),
+    (0.62, 0.160, 0.116, 0.107),
+    (0.74, 0.174, 0.125, 0.116),
+    (0.84, 0.182, 0.128, 0.121),
+    (0.92, 0.181, 0.119, 0.121),
+    (1.00, 0.168, 0.100, 0.114),
+    (1.06, 0.143, 0.080, 0.103, -0.004),
+    (1.10, 0.115, 0.064, 0.092, -0.008),
+    (1.12, 0.101, 0.056, 0.085, -0.010),
+    (1.12, 0.080, 0.040, 0.066, -0.010),
 )
 PELVIS = (
     (-0.23, 0.040, 0.030, 0.030),
@@ -59,36 +59,37 @@ PELVIS = (
     (0.34, 0.100, 0.070, 0.060),
 )
 WAISTBAND = (
-    (0.25, 0.120, 0.090, 0.085),
-    (0.26, 0.158, 0.112, 0.110),
-    (0.31, 0.153, 0.110, 0.105),
-    (0.36, 0.147, 0.108, 0.099),
-    (0.37, 0.130, 0.094, 0.085),
+    (0.275, 0.120, 0.090, 0.085),
+    (0.280, 0.156, 0.112, 0.108),
+    (0.310, 0.153, 0.110, 0.105),
+    (0.345, 0.149, 0.108, 0.100),
+    (0.350, 0.130, 0.094, 0.085),
 )
 # at is metres above the shoulder joints.
 NECK = (
-    (-0.030, 0.050, 0.040, 0.055, -0.012),
-    (0.030, 0.062, 0.052, 0.066, -0.010),
-    (0.060, 0.058, 0.054, 0.062, -0.008),
-    (0.090, 0.056, 0.054, 0.060, -0.002),
-    (0.125, 0.057, 0.056, 0.060, 0.004),
-    (0.160, 0.050, 0.050, 0.050, 0.004),
+    (-0.030, 0.110, 0.045, 0.070, -0.012),
+    (0.045, 0.100, 0.052, 0.080, -0.012),
+    (0.064, 0.083, 0.054, 0.077, -0.011),
+    (0.082, 0.067, 0.055, 0.070, -0.009),
+    (0.105, 0.058, 0.055, 0.063, -0.004),
+    (0.130, 0.057, 0.056, 0.060, 0.002),
+    (0.165, 0.050, 0.050, 0.050, 0.004),
 )
 # at runs along the arm: 0 shoulder, 1 elbow, 2 wrist; sides is in the plane of the raised arm.
 ARM = (
     (-0.22, 0.018, 0.018, 0.018),
-    (-0.17, 0.044, 0.042, 0.044),
-    (-0.06, 0.061, 0.060, 0.060),
-    (0.10, 0.063, 0.063, 0.062),
-    (0.30, 0.056, 0.060, 0.057),
-    (0.50, 0.049, 0.057, 0.052),
+    (-0.17, 0.046, 0.044, 0.046),
+    (-0.06, 0.063, 0.062, 0.062),
+    (0.12, 0.065, 0.065, 0.064),
+    (0.28, 0.058, 0.061, 0.058),
+    (0.50, 0.049, 0.057, 0.053),
     (0.75, 0.043, 0.048, 0.047),
     (0.94, 0.041, 0.042, 0.043),
     (1.05, 0.043, 0.043, 0.042),
-    (1.20, 0.045, 0.047, 0.042),
-    (1.40, 0.042, 0.044, 0.040),
-    (1.65, 0.034, 0.036, 0.034),
-    (1.88, 0.028, 0.031, 0.031),
+    (1.20, 0.046, 0.048, 0.043),
+    (1.40, 0.043, 0.045, 0.041),
+    (1.65, 0.035, 0.037, 0.035),
+    (1.88, 0.029, 0.031, 0.031),
     (2.00, 0.026, 0.030, 0.030),
 )
 # at is metres from the wrist towards the knuckles; front is the side of the thumb.
@@ -322,15 +323,15 @@ def _trunk(m: Modeller) -> None:
     broad = _ratio(m, "upper_arm", MODEL_SHOULDER)
     hip = _ratio(m, "thigh", MODEL_HIP)
     for role, rows, count, exponent in (
-        ("shirt", TRUNK, 22, 2.35),
-        ("shorts", PELVIS, 13, 2.3),
+        ("shirt", TRUNK, 19, 2.35),
+        ("shorts", PELVIS, 10, 2.3),
         ("trim", WAISTBAND, 7, 2.35),
     ):
         table = m.sized(rows, along=False)
         up = np.clip(table[:, AT], 0.0, 1.0)
         table[:, 1] *= (1 - up) * hip + up * broad
         rings = profile(table, count)
-        points = place(rings, ring_points(rings, 28, exponent), hips, axis, LEFT, FRONT)
+        points = place(rings, ring_points(rings, 24, exponent), hips, axis, LEFT, FRONT)
         weights = m.passing(chain, points[..., 1])
         if role == "shirt":
             _follow_shoulders(m, points, weights)
@@ -375,22 +376,22 @@ def _neck_and_head(m: Modeller) -> None:
 
     tall = (crown - chin) * UP
     table = m.sized(HEAD, along=False)
-    rings = profile(table, 22)
-    shape = ring_points(rings, 24, 2.15)
+    rings = profile(table, 18)
+    shape = ring_points(rings, 22, 2.15)
     points = place(rings, shape, skull, tall, LEFT, FRONT)
     m.add("skin", points, m.only(head, len(rings)))
     _hair(m, table, skull, tall, head)
 
     def bead(role: str, where: Sequence[float], size: Sequence[float], tilt: float = 0.0) -> None:
         """An ellipsoid on the head; where = (side, way from chin to crown, ahead)."""
-        angle = np.linspace(0.0, np.pi, 8)
-        ring = np.zeros((8, 5))
+        angle = np.linspace(0.0, np.pi, 6)
+        ring = np.zeros((6, 5))
         ring[:, AT] = -np.cos(angle) * size[1] * k
         ring[:, 1] = np.maximum(np.sin(angle), 0.05) * size[0] * k
         ring[:, 2] = ring[:, 3] = np.maximum(np.sin(angle), 0.05) * size[2] * k
         ring[:, AHEAD] = -tilt * ring[:, AT]
         centre = skull + where[0] * k * LEFT + where[1] * tall + where[2] * k * FRONT
-        m.add(role, place(ring, ring_points(ring, 10), centre, UP, LEFT, FRONT), m.only(head, 8))
+        m.add(role, place(ring, ring_points(ring, 9), centre, UP, LEFT, FRONT), m.only(head, 6))
 
     bead("skin", (0.0, 0.415, 0.087), (0.0125, 0.028, 0.019), 0.45)  # nose
     for sign in (1.0, -1.0):
@@ -401,13 +402,13 @@ def _neck_and_head(m: Modeller) -> None:
 
 def _hair(m: Modeller, table: np.ndarray, skull: np.ndarray, tall: np.ndarray, head: int) -> None:
     """A cap over the skull, down to the brow's height in front, the ears, and the nape."""
-    segments = 28
+    segments = 24
     angle = 2 * np.pi * np.arange(segments) / segments
     ahead = np.sin(angle)
     line = np.where(
         ahead > 0, 0.56 + 0.24 * np.abs(ahead) ** 0.7, 0.56 - 0.30 * np.abs(ahead) ** 1.5
     )
-    rings = 9
+    rings = 8
     fraction = np.linspace(0.0, 1.0, rings)[:, None]
     way = line + (1.0 - line) * np.sin(0.5 * np.pi * fraction)
     dense = profile(table, 200)
@@ -459,20 +460,20 @@ def _arm(m: Modeller, side: str, sign: float) -> None:
     axis = _unit(path[2] - path[0])
     ahead = _unit(FRONT - axis * float(FRONT @ axis))
     outer = np.cross(ahead, axis) * sign
-    rings = profile(_along_limb(m, ARM, reach), 30)
-    points = place_along(rings, ring_points(rings, 16), path, outer, ahead)
+    rings = profile(_along_limb(m, ARM, reach), 25)
+    points = place_along(rings, ring_points(rings, 14), path, outer, ahead)
     m.add("skin", points, m.passing(chain, rings[:, AT]))
 
     fist = _unit(path[2] - path[1])
     ahead = _unit(FRONT - fist * float(FRONT @ fist))
     outer = np.cross(ahead, fist) * sign
     at_wrist = [(forearm, 0.0, 0.0), (hand, -0.025 * k, 0.03 * k)]
-    for role, rows, count in (("gloves", GLOVE, 16), ("trim", CUFF, 5)):
+    for role, rows, count in (("gloves", GLOVE, 13), ("trim", CUFF, 5)):
         rings = profile(m.sized(rows, along=True), count)
-        points = place(rings, ring_points(rings, 18, 2.25), path[2], fist, outer, ahead)
+        points = place(rings, ring_points(rings, 16, 2.25), path[2], fist, outer, ahead)
         m.add(role, points, m.passing(at_wrist, rings[:, AT]))
     # The thumb lies along the fist's front, towards the palm.
-    rings = profile(m.sized(GLOVE_THUMB, along=True), 8)
+    rings = profile(m.sized(GLOVE_THUMB, along=True), 7)
     root = path[2] + k * (0.016 * fist + 0.040 * ahead - 0.022 * outer)
     along = _unit(fist + 0.28 * ahead - 0.10 * outer)
     points = place(rings, ring_points(rings, 10), root, along, outer, ahead)
@@ -491,10 +492,10 @@ def _leg(m: Modeller, side: str, sign: float) -> None:
         (foot, reach[2], 0.03 * k),
     ]
     for role, rows, count, segments in (
-        ("skin", LEG, 28, 18),
-        ("shorts", SHORTS_LEG, 14, 20),
-        ("trim", SOCK, 5, 18),
-        ("shoes", BOOT, 9, 18),
+        ("skin", LEG, 22, 16),
+        ("shorts", SHORTS_LEG, 11, 20),
+        ("trim", SOCK, 5, 16),
+        ("shoes", BOOT, 8, 16),
     ):
         rings = profile(_along_limb(m, rows, reach), count)
         points = place_along(rings, ring_points(rings, segments), path, sign * LEFT, FRONT)
@@ -530,8 +531,8 @@ def _foot(m: Modeller, side: str) -> None:
         table[:, 1] = shape[:, 1] + rim
         table[:, 2] = table[:, 3] = 0.5 * (top - low)  # here "front" is up
         table[:, AHEAD] = 0.5 * (top + low)
-        rings = profile(table * k, 14)
-        points = place(rings, ring_points(rings, 16, exponent), base, ahead, across, UP)
+        rings = profile(table * k, 12)
+        points = place(rings, ring_points(rings, 14, exponent), base, ahead, across, UP)
         m.add(role, points, m.passing(chain, rings[:, AT]))
 
 

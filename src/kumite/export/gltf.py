@@ -2,11 +2,12 @@
 
 glTF 2.0: metres, right-handed, Y up like ours; only its quaternions are xyzw. Each joint is a node;
 the skin's inverse bind matrices undo the rest pose, in which no joint is turned. Joints that never
-turn get no animation channel; a channel's keys are the recording's frames.
+turn get no animation channel; a channel's keys are the recording's frames, or another rate's.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -17,9 +18,9 @@ import pygltflib as gltf
 from kumite import files
 from kumite.body import BodyMesh, body_mesh, palette
 from kumite.body.mesh import ROLES
-from kumite.clip import NO_PARENT, Skeleton
+from kumite.clip import MOST_FRAMES, NO_PARENT, Skeleton
 from kumite.errors import KumiteError
-from kumite.rotation import continuous
+from kumite.rotation import continuous, slerp
 from kumite.scene.recording import Recording
 
 GENERATOR = "Kumite"
@@ -29,13 +30,18 @@ OBJECT_RADIUS = 0.1  # m, where a recording does not say
 _ROUGHNESS = {"gloves": 0.35, "shoes": 0.45, "skin": 0.6}
 
 
-def write_glb(path: Path | str, recording: Recording) -> None:
+def write_glb(path: Path | str, recording: Recording, *, fps: float | None = None) -> None:
     """Write a recording as binary glTF. The file appears whole or not at all.
 
-    Errors: values that are not finite; a file that cannot be written.
+    ``fps``: keys a second, the recording's own unless given.
+
+    Errors: values that are not finite; a rate that is not more than 0; a file that cannot be
+    written.
     """
     if not (np.isfinite(recording.root_position).all() and np.isfinite(recording.wxyz).all()):
         raise KumiteError(f"{path}: the recording holds values that are not finite")
+    if fps is not None and fps != recording.fps:
+        recording = _at_rate(recording, fps)
     document = _Document(recording.scene, len(recording), recording.fps)
     mesh = body_mesh(recording.skeleton)
     skin_data = _share_mesh(document, mesh)
@@ -45,6 +51,40 @@ def write_glb(path: Path | str, recording: Recording) -> None:
     _add_objects(document, recording)
     with files.writing(path) as temporary:
         temporary.write_bytes(document.to_bytes())
+
+
+def _at_rate(recording: Recording, fps: float) -> Recording:
+    """What is seen of a recording, at another rate; marks on frames are those of the frame before.
+
+    Its events are left out: they count frames of the first rate, and GLB holds none.
+    """
+    if not (np.isfinite(fps) and fps > 0):
+        raise KumiteError(f"{recording.scene}: {fps} keys a second, expected more than 0")
+    last = len(recording) - 1
+    keys = last * fps / recording.fps
+    if keys > MOST_FRAMES:
+        raise KumiteError(
+            f"{recording.scene}: {keys:.3g} keys at {fps:g} a second; "
+            f"expected at most {MOST_FRAMES}"
+        )
+    at = np.minimum(np.arange(int(keys + 1e-6) + 1) * (recording.fps / fps), last)
+    before = (at + 1e-9).astype(np.int64)
+    after = np.minimum(before + 1, last)
+    part = np.maximum(at - before, 0.0)[:, None, None]
+
+    def between(values: np.ndarray) -> np.ndarray:
+        return values[before] * (1 - part) + values[after] * part
+
+    return replace(
+        recording,
+        fps=fps,
+        root_position=between(recording.root_position),
+        wxyz=slerp(recording.wxyz[before], recording.wxyz[after], part),
+        contacts=recording.contacts[before],
+        library_frame=recording.library_frame[before],
+        object_position=between(recording.object_position),
+        events=(),
+    )
 
 
 class _Document:

@@ -35,6 +35,7 @@ BACKGROUND = np.array([0.93, 0.94, 0.95])
 FLOOR = np.array([0.84, 0.85, 0.86])
 OBJECT_COLOUR = np.array([0.95, 0.75, 0.15])
 GRID = 0.5  # m
+HAZE_FROM, HAZE_DEPTH = 4.0, 10.0  # m behind the last figure, and how deep at least
 OBJECT_RADIUS = 0.1  # m, where a recording does not say
 
 
@@ -44,9 +45,11 @@ class Camera:
 
     eye: np.ndarray  # [3] m
     axes: np.ndarray  # [3, 3] rows: right, up, towards the eye
+    distance: float  # m, from the eye to what it looks at
     focal: float  # pixels
     width: int  # pixels
     height: int  # pixels
+    depth: float = 0.0  # m, how far behind that the scene goes on
 
     def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pixels [V, 2] and nearness 1/z [V] of points [V, 3]."""
@@ -66,17 +69,25 @@ class Camera:
 
 
 def look(
-    target: np.ndarray, yaw: float, pitch: float, span: float, size: tuple[int, int]
+    target: np.ndarray,
+    yaw: float,
+    pitch: float,
+    span: float,
+    size: tuple[int, int],
+    depth: float = 0.0,
 ) -> Camera:
     """A camera that sees ``span`` metres from top to bottom at the target.
 
     ``yaw``: the side of the target it stands on (0: +Z), ``pitch``: how high, both in radians.
+    ``depth``: how far [m] behind the target there is something to see: haze begins after that.
     """
     width, height = size
     back = np.array([np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)])
     right = np.array([np.cos(yaw), 0.0, -np.sin(yaw)])
     axes = np.stack([right, np.cross(back, right), back])
-    return Camera(target + LENS * span * back, axes, LENS * height, width, height)
+    distance = LENS * span
+    eye = target + distance * back
+    return Camera(eye, axes, distance, LENS * height, width, height, depth)
 
 
 # Rendering ---------------------------------------------------------------------------------------
@@ -97,9 +108,11 @@ def render(camera: Camera, shapes: Sequence[Shape]) -> np.ndarray:
     fine = Camera(
         camera.eye,
         camera.axes,
+        camera.distance,
         camera.focal * SAMPLES,
         camera.width * SAMPLES,
         camera.height * SAMPLES,
+        camera.depth,
     )
     # The key light stands over the camera's left shoulder, so that every view is lit alike.
     light = camera.axes.T @ np.array([-0.45, 0.55, 0.70])
@@ -143,12 +156,10 @@ def _floor(
     if shapes:
         _cast_shadows(camera, shapes, light, shade)
     colour = FLOOR * (1.0 - 0.14 * line - 0.30 * shade[..., 0])[..., None]
-    centre = camera.eye - camera.axes[2] * (camera.focal / camera.height) * 0.0
-    del centre
-    target = camera.eye - camera.axes[2] * LENS
-    away = np.hypot(at[..., 0] - target[0], at[..., 1] - target[2])
-    fade = np.clip((away - 6.0) / 10.0, 0.0, 1.0) * down
-    haze = np.where(down, fade, 1.0)[..., None]
+    # Haze is of the distance behind all that is shown, and as deep as that.
+    behind = way - camera.distance - camera.depth - HAZE_FROM
+    behind = np.clip(behind / (HAZE_DEPTH + camera.depth), 0.0, 1.0)
+    haze = np.where(down, behind, 1.0)[..., None]
     image = colour * (1.0 - haze) + BACKGROUND * haze
     return np.ascontiguousarray(image), np.where(down, 1.0 / np.maximum(way, 1e-6), 0.0)
 
@@ -328,7 +339,8 @@ def _cameras(
     seen = np.abs((joints - target[:, None]) @ probe.axes.T).max(axis=(0, 1))
     flesh = 0.16  # m around the joints
     span = 2 * max(seen[1] + flesh, (seen[0] + flesh) * size[1] / size[0]) * MARGIN
-    return [look(t, yaw, pitch, float(span), size) for t in target]
+    depth = float(((target[:, None] - joints) @ probe.axes[2]).max())
+    return [look(t, yaw, pitch, float(span), size, max(depth, 0.0)) for t in target]
 
 
 def _front(skeleton: Skeleton, root: np.ndarray, wxyz: np.ndarray) -> float:
