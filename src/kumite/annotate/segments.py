@@ -24,7 +24,7 @@ from enum import IntEnum
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from kumite.annotate.contacts import Contacts
+from kumite.annotate.contacts import Contacts, find_contacts
 from kumite.clip import SIDES, ClipSet
 from kumite.rotation import planar_apply, planar_inverse
 
@@ -43,6 +43,7 @@ SMOOTHING = 0.03  # s, of positions before they are differentiated: captures tre
 BOUNCE = 0.25  # how much of the pelvis' up and down counts as movement
 CALM = 30.0  # percentile of quietness below which a clip's guard is taken
 QUIETEST = 5.0  # percentile: a boxer who never stands still is quiet in his own way
+LIGHT = (0.03, 0.3)  # m and m/s: a foot that is lifted so little steps, too
 LYING = 0.5  # of the height of the pelvis in guard: below it the body lies, and may rest there
 
 
@@ -59,6 +60,7 @@ class CutSettings:
     after: float = 0.2  # and ends later than it is seen to: returns are slow at last
     long_rest: float = 0.8  # a rest that lasts is idleness, a part of its own
     short_rest: float = 0.3  # a shorter one does not part two steps on the spot
+    stand: float = 0.2  # shorter double support is part of a step
     shortest: float = 0.15  # of a part
 
 
@@ -134,16 +136,17 @@ def find_cuts(
     clips: ClipSet, contacts: Contacts, motion: Motion, settings: CutSettings
 ) -> tuple[np.ndarray, np.ndarray]:
     """Frames [P + 1] at which clips are cut, borders included, and why [P + 1] (Cut)."""
+    light = find_contacts(clips, height=LIGHT[0], speed=LIGHT[1]).on_ground
     frames: list[int] = []
     reasons: list[Cut] = []
     for c in range(len(clips.names)):
         a, b = int(clips.clip_start[c]), int(clips.clip_start[c + 1])
         frames.append(a)
         reasons.append(Cut.BORDER)
-        on_ground = contacts.on_ground[a:b]
-        rests = _rests(motion, on_ground, c, a, b, clips.fps, settings)
+        rests = _rests(motion, _stands(light[a:b], clips.fps, settings), c, a, b, clips.fps, settings)
         cuts = _rest_cuts(rests, motion.quiet[a:b], clips.fps, settings)
-        steps = _landings(on_ground, clips.fps)
+        steps = _landings(light[a:b], clips.fps)
+        cuts = _at_landings(cuts, steps, clips.fps)
         found = dict(cuts)
         for begin, end in zip([0, *found], [*found, b - a]):
             inside = steps[(steps > begin) & (steps < end - 0.05 * clips.fps)]
@@ -160,7 +163,7 @@ def find_cuts(
 
 def _rests(
     motion: Motion,
-    on_ground: np.ndarray,
+    stands: np.ndarray,
     clip: int,
     a: int,
     b: int,
@@ -175,7 +178,7 @@ def _rests(
     ahead, behind = np.minimum(k + reach, b - a - 1), np.maximum(k - reach, 0)
     gone = np.linalg.norm(place[ahead] - place[behind], axis=1) * fps / (2 * reach)
     lying = motion.position[a:b, PELVIS, 1] < LYING * motion.standing[clip]
-    near = (motion.away[a:b] < settings.near) & on_ground.all(axis=1) & (gone < settings.going)
+    near = (motion.away[a:b] < settings.near) & stands & (gone < settings.going)
     resting = (quiet < _limit(quiet, settings)) & (near | lying)
     runs = _runs(resting)
     if len(runs) > 1:  # moments too short to be a movement part no rest
@@ -190,6 +193,15 @@ def _rests(
     return runs[runs[:, 1] - runs[:, 0] >= 0.04 * fps]
 
 
+def _stands(on_ground: np.ndarray, fps: float, settings: CutSettings) -> np.ndarray:
+    """Frames [F] of double support that is more than a gait's, from step to step."""
+    both = on_ground.all(axis=1)
+    for a, b in _runs(both).tolist():
+        if b - a < settings.stand * fps and a > 0 and b < len(both):
+            both[a:b] = False
+    return both
+
+
 def _limit(quiet: np.ndarray, settings: CutSettings) -> float:
     """What counts as quiet in a clip [m/s]."""
     own = 1.5 * float(np.percentile(quiet, QUIETEST))
@@ -201,7 +213,7 @@ def _rest_cuts(
 ) -> list[tuple[int, Cut]]:
     """Cuts of a clip at its rests: in order, frames within the clip."""
     count = len(quiet)
-    limit = 0.5 * _limit(quiet, settings)
+    limit = 0.6 * _limit(quiet, settings)
     out: list[tuple[float, Cut]] = []
     before, after, shortest = (
         t * fps for t in (settings.before, settings.after, settings.shortest)
@@ -213,7 +225,7 @@ def _rest_cuts(
         if b < count and b - a >= lasting:  # slow beginnings: after a stand they can be seen
             still = np.flatnonzero(quiet[a:b] < limit)
             if len(still):
-                b = max(b - round(0.085 * fps), a + int(still[-1]) + 1)
+                b = max(b - round(0.1 * fps), a + int(still[-1]) + 1)
         if a == 0:
             if b - before > shortest:
                 out.append((b - before, Cut.REST_ENDS))
@@ -227,6 +239,17 @@ def _rest_cuts(
             out.append((max(b - before, 0.5 * (a + b)), Cut.SHORT_REST if short else Cut.REST))
     rounded = [(round(frame), reason) for frame, reason in out]
     return sorted({frame: reason for frame, reason in rounded if 0 < frame < count}.items())
+
+
+def _at_landings(
+    cuts: list[tuple[int, Cut]], steps: np.ndarray, fps: float
+) -> list[tuple[int, Cut]]:
+    """Cuts at short rests go back to the landing that the rest is of, if it was just before."""
+    out = []
+    for frame, reason in cuts:
+        just = steps[(steps <= frame) & (steps > frame - 0.1 * fps)]
+        out.append((int(just[-1]) if reason == Cut.SHORT_REST and len(just) else frame, reason))
+    return out
 
 
 def _landings(on_ground: np.ndarray, fps: float) -> np.ndarray:
