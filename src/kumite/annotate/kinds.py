@@ -14,7 +14,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from kumite.annotate.contacts import Contacts, velocity
-from kumite.annotate.segments import CHEST, FEET, HANDS, HEAD, LYING, PELVIS, SMOOTHING, Motion
+from kumite.annotate.segments import FEET, HANDS, HEAD, LYING, PELVIS, SMOOTHING, Motion
 from kumite.annotate.strikes import Strikes
 from kumite.clip import LIMBS, ClipSet, tip_positions
 from kumite.rotation import conjugate, multiply, planar_apply, planar_inverse
@@ -36,7 +36,9 @@ class KindSettings:
     step: float = 0.12  # m: less is no step
     swing: float = 0.17  # rad: less is no turn
     duck: float = 0.24  # m that the head goes down
-    low: float = 0.82  # of the pelvis' height in guard: below it knees are bent to get out of the way
+    low: float = (
+        0.82  # of the pelvis' height in guard: below it knees are bent to get out of the way
+    )
     block: float = 0.13  # m that a hand goes from where the guard has it, seen from the head
 
 
@@ -52,7 +54,9 @@ class Trajectories:
     snap: np.ndarray  # [P] rad/s², peak acceleration of the head's turn
     trunk: np.ndarray  # [P] rad/s, peak speed of the chest against the pelvis
     arm: np.ndarray  # [P] m/s², peak acceleration of either fist seen from the head
-    hand: np.ndarray  # [P, 2, 3] m, furthest from where it began, seen from the head, left and right
+    hand: (
+        np.ndarray
+    )  # [P, 2, 3] m, furthest from where it began, seen from the head, left and right
     aloft: np.ndarray  # [P] s in which no foot is on the ground
 
 
@@ -166,7 +170,7 @@ def _defence(t: Trajectories, k: int, ducks: bool, settings: KindSettings) -> st
 
 
 def strike_directions(clips: ClipSet, strikes: Strikes) -> list[str]:
-    """How each blow [X] goes: straight, hook, uppercut, kick, slash or thrust; "" a foot in a run."""
+    """How each blow [X] goes: straight, hook, uppercut, kick, slash or thrust; "" of a running foot."""
     position, world = clips.world
     weapon = clips.skeleton.roles.get("sword")
     out = []
@@ -198,8 +202,3 @@ def strike_directions(clips: ClipSet, strikes: Strikes) -> list[str]:
 KICK = 0.3  # m: a foot that stays below it runs
 UPWARD = 0.6  # of a fist's velocity at its fastest: an uppercut's
 OUTWARD = 0.75  # away from the chest: a straight's
-
-
-def chest_of(motion: Motion) -> np.ndarray:
-    """Places of the chest [F, 3]."""
-    return motion.position[:, CHEST]

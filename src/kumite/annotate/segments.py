@@ -143,10 +143,11 @@ def find_cuts(
         a, b = int(clips.clip_start[c]), int(clips.clip_start[c + 1])
         frames.append(a)
         reasons.append(Cut.BORDER)
-        rests = _rests(motion, _stands(light[a:b], clips.fps, settings), c, a, b, clips.fps, settings)
+        rests = _rests(
+            motion, _stands(light[a:b], clips.fps, settings), c, a, b, clips.fps, settings
+        )
         cuts = _rest_cuts(rests, motion.quiet[a:b], clips.fps, settings)
         steps = _landings(light[a:b], clips.fps)
-        cuts = _at_landings(cuts, steps, clips.fps)
         found = dict(cuts)
         for begin, end in zip([0, *found], [*found, b - a]):
             inside = steps[(steps > begin) & (steps < end - 0.05 * clips.fps)]
@@ -239,17 +240,6 @@ def _rest_cuts(
             out.append((max(b - before, 0.5 * (a + b)), Cut.SHORT_REST if short else Cut.REST))
     rounded = [(round(frame), reason) for frame, reason in out]
     return sorted({frame: reason for frame, reason in rounded if 0 < frame < count}.items())
-
-
-def _at_landings(
-    cuts: list[tuple[int, Cut]], steps: np.ndarray, fps: float
-) -> list[tuple[int, Cut]]:
-    """Cuts at short rests go back to the landing that the rest is of, if it was just before."""
-    out = []
-    for frame, reason in cuts:
-        just = steps[(steps <= frame) & (steps > frame - 0.1 * fps)]
-        out.append((int(just[-1]) if reason == Cut.SHORT_REST and len(just) else frame, reason))
-    return out
 
 
 def _landings(on_ground: np.ndarray, fps: float) -> np.ndarray:

@@ -1,0 +1,470 @@
+"""The text file of actions, which a person edits and a program writes again.
+
+::
+
+    == jab_left  1251 frames  30 a second
+    jab_left    0   41  idle    -          none      idle                 d3c0f1
+    jab_left   41   83  attack  left_hand  straight  left_hand_straight   5e12aa
+
+A clip's heading says how many frames it has; under it stands a line for each action: clip, start,
+stop (frames of the clip; stop is one past the last), kind, limb, direction, label. Words with a
+space in them stand in double quotes.
+
+**Edits survive.** Nothing but the file itself tells what a person has done, so that it can be
+moved, mailed and kept in version control:
+
+- a line that a program wrote ends in a check word, made from the line's other words. A line whose
+  check word is missing or does not fit was written or changed by a person and is kept as it stands;
+- the lines of a program cover each clip from its first frame to its last. Frames of a clip with a
+  heading that no line covers were uncovered by a person: they stay so;
+- a comment (from ``#`` to the end of a line) makes its line a person's; one on a line of its own is
+  kept before the line that it stood before.
+
+So :func:`merge` needs no memory: it keeps what a person wrote, leaves out what a person took out
+and fills the rest from a new analysis. Where both claim a frame, the person's line has it.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import zlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from kumite import files
+from kumite.annotate.actions import DIRECTIONS, DIRECTIONS_OF, KINDS, NO_LIMB, Actions
+from kumite.clip import LIMBS, ClipSet
+from kumite.errors import KumiteError, at, unknown
+from kumite.mocap import text
+
+NONE = "-"  # no limb, no label
+HEADING = "=="
+OURS = "#:"  # begins a comment of ours, which is written anew each time
+_WORD = re.compile(r'\s*("(?:[^"\\]|\\.)*"|#.*|[^\s#"][^\s"]*)')
+SLIVER = 0.15  # s: less than this left of a line is not an action
+_MOST = 10**9  # frames: a number beyond it is no frame
+
+_HELP = (
+    "actions found by `kumite segment`: clip, start, stop, kind, limb, direction, label, check",
+    "change, add, split, join or delete lines as you like: running it again keeps what you did",
+    "start and stop are frames of the clip, stop is one past the last; words with spaces in quotes",
+    "the check word tells lines that you have not touched; delete it to keep a line as it is",
+    *(f"{kind}: {', '.join(ways)}" for kind, ways in DIRECTIONS_OF.items()),
+    f"limb: {', '.join(LIMBS)} or {NONE}; a sword strikes with the hand that holds it",
+)
+
+
+@dataclass(frozen=True)
+class Line:
+    """One action as it stands in a file, in frames of its clip."""
+
+    clip: str
+    start: int
+    stop: int
+    kind: str
+    limb: str  # or NONE
+    direction: str
+    label: str
+    by_hand: bool = False
+    comment: str = ""  # behind it, with its #
+    number: int | None = None  # line in the file it was read from
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        return (
+            _quoted(self.clip),
+            str(self.start),
+            str(self.stop),
+            self.kind,
+            self.limb,
+            _quoted(self.direction),
+            _quoted(self.label or NONE),
+        )
+
+    @property
+    def check(self) -> str:
+        return f"{zlib.crc32(' '.join(self.words).encode()) & 0xFFFFFF:06x}"
+
+
+@dataclass(frozen=True)
+class Section:
+    """What a file says of one clip."""
+
+    lines: tuple[Line, ...]  # in order of their starts
+    frames: int | None = None  # that the heading gives; None without a heading
+    fps: float | None = None
+    comments: tuple[tuple[int, str], ...] = ()  # (start of the line after it, comment)
+    number: int | None = None  # of the heading
+
+
+@dataclass(frozen=True)
+class ActionFile:
+    """A file of actions: a section a clip, and comments that stand before all of them."""
+
+    sections: Mapping[str, Section]
+    comments: tuple[str, ...] = ()
+
+
+@dataclass
+class Kept:
+    """What a person had done to a file and is kept in the new one."""
+
+    lines: int = 0
+    gaps: int = 0  # runs of frames that no line covers
+    comments: int = 0
+    written: int = 0  # lines by the program
+    clips: list[str] = field(default_factory=list)  # with any of these
+
+
+# Reading -----------------------------------------------------------------------------------------
+
+
+def parse(path: Path | str) -> ActionFile:
+    """What a file holds, checked word by word. Errors: the first that is wrong, with its line."""
+    path = Path(path)
+    sections: dict[str, Section] = {}
+    lines: dict[str, list[Line]] = {}
+    waiting: list[str] = []
+    head: list[str] = []
+    current: str | None = None
+    comments: dict[str, list[tuple[int, str]]] = {}
+    source = text.decode(path, text.read_bytes(path))
+    for number, row in enumerate(source.split("\n"), 1):
+        words, comment = _split(path, number, row)
+        if not words:
+            if comment and not comment.startswith(OURS):
+                waiting.append(comment)
+            continue
+        if words[0] == HEADING:
+            _end_comments(waiting, current, head, comments)
+            current, section = _heading(path, number, words)
+            if current in sections:
+                raise at(path, number, f"a second heading of clip {current!r}; expected one")
+            sections[current] = section
+            continue
+        line = _line(path, number, words, comment)
+        place = comments.setdefault(line.clip, []) if current is not None or lines else None
+        for c in waiting:
+            if place is None:
+                head.append(c)
+            else:
+                place.append((line.start, c))
+        waiting.clear()
+        lines.setdefault(line.clip, []).append(line)
+    _end_comments(waiting, current, head, comments)
+    for name in (*lines, *comments):
+        sections.setdefault(name, Section(()))
+    for name, section in sections.items():
+        mine = sorted(lines.get(name, ()), key=lambda x: (x.start, x.stop))
+        sections[name] = replace(section, lines=tuple(mine), comments=tuple(comments.get(name, ())))
+    return ActionFile(sections, tuple(head))
+
+
+def _end_comments(
+    waiting: list[str],
+    current: str | None,
+    head: list[str],
+    comments: dict[str, list[tuple[int, str]]],
+) -> None:
+    """Comments with no line after them belong to the end of the section they stand in."""
+    for comment in waiting:
+        if current is None:
+            head.append(comment)
+        else:
+            comments.setdefault(current, []).append((_MOST, comment))
+    waiting.clear()
+
+
+def _split(path: Path, number: int, row: str) -> tuple[list[str], str]:
+    """The words of a row and the comment behind them."""
+    words: list[str] = []
+    i, row = 0, row.rstrip()
+    while i < len(row):
+        match = _WORD.match(row, i)
+        if match is None:
+            raise at(
+                path, number, f"{text.shown(row[i:].strip())} has no closing quote; expected one"
+            )
+        word = match[1]
+        if word.startswith("#"):
+            return words, word
+        if word.startswith('"'):
+            try:
+                word = json.loads(word)
+            except ValueError:
+                raise at(
+                    path, number, f"{text.shown(word)} is no quoted word; expected one as in JSON"
+                ) from None
+        words.append(word)
+        i = match.end()
+    return words, ""
+
+
+def _heading(path: Path, number: int, words: list[str]) -> tuple[str, Section]:
+    if len(words) != 7 or words[3] != "frames" or words[5:] != ["a", "second"]:
+        shape = f"{HEADING} CLIP N frames RATE a second"
+        raise at(path, number, f"{text.shown(' '.join(words))}; expected {shape}")
+    frames = _frame(path, number, words[2], "the clip's number of frames")
+    fps = text.number(path, number, words[4], "the clip's frames a second")
+    if frames == 0 or fps <= 0:
+        raise at(path, number, "a clip without frames; expected numbers more than 0")
+    return words[1], Section((), frames, fps, (), number)
+
+
+def _line(path: Path, number: int, words: list[str], comment: str) -> Line:
+    if len(words) not in (7, 8):
+        shape = "clip start stop kind limb direction label, and perhaps a check word"
+        raise at(
+            path, number, f"{len(words)} words; expected {shape} (labels with spaces in quotes)"
+        )
+    clip, first, last, kind, limb, direction, label = words[:7]
+    start = _frame(path, number, first, "the frame at which the action starts")
+    stop = _frame(path, number, last, "the frame at which the action stops")
+    try:
+        if kind not in KINDS:
+            raise unknown("kind", kind, KINDS)
+        if limb != NONE and limb not in LIMBS:
+            raise unknown("limb", limb, (*LIMBS, NONE))
+        if direction not in DIRECTIONS_OF[kind]:
+            raise unknown(f"direction of {kind}", direction, DIRECTIONS_OF[kind])
+    except KumiteError as error:
+        raise at(path, number, str(error)) from None
+    if stop <= start:
+        raise at(path, number, f"stop {stop} is not after start {start}; expected a later frame")
+    label = "" if label == NONE else label
+    line = Line(clip, start, stop, kind, limb, direction, label, True, comment, number)
+    untouched = len(words) == 8 and words[7] == line.check and not comment
+    return replace(line, by_hand=not untouched)
+
+
+def _frame(path: Path, number: int, word: str, what: str) -> int:
+    if not re.fullmatch(r"\d{1,9}", word, re.ASCII):
+        raise at(path, number, f"{text.shown(word)} is not a frame; expected {what}, from 0")
+    return int(word)
+
+
+def check(path: Path | str, known: ActionFile, clips: Sequence[ClipSet]) -> None:
+    """That a file fits clips. Errors: an unknown clip, another rate, a line outside its clip, two
+    lines by hand that overlap.
+    """
+    size = {n: int(k) for s in clips for n, k in zip(s.names, np.diff(s.clip_start))}
+    rate = {n: s.fps for s in clips for n in s.names}
+    for name, section in known.sections.items():
+        first = section.number or next((x.number for x in section.lines), None)
+        if name not in size:
+            raise at(path, first, str(unknown("clip", name, size)))
+        if section.fps is not None and abs(section.fps - rate[name]) > 1e-3:
+            raise at(
+                path,
+                section.number,
+                f"clip {name!r} is cut at {section.fps:g} frames a second and loaded at "
+                f"{rate[name]:g}; expected one rate (--fps {section.fps:g})",
+            )
+        before: Line | None = None
+        for line in (x for x in section.lines if x.by_hand):
+            if line.stop > size[name]:
+                raise at(
+                    path,
+                    line.number,
+                    f"stop {line.stop} is outside clip {name!r}; expected at most {size[name]}",
+                )
+            if before is not None and line.start < before.stop:
+                raise at(
+                    path,
+                    line.number,
+                    f"{line.start} to {line.stop} overlaps line {before.number} "
+                    f"({before.start} to {before.stop}); expected actions one after the other",
+                )
+            before = line
+
+
+def read_actions(path: Path | str, clips: ClipSet) -> Actions:
+    """The actions that a file gives clips, in order; a person's lines have what two lines claim.
+
+    Clips that the file does not name have none. Errors: not such a file; a line that is wrong or
+    does not fit the clips, as ``actions.txt:17: what; what was expected``.
+    """
+    known = parse(path)
+    check(path, known, [clips])
+    lines = []
+    for c, name in enumerate(clips.names):
+        section = known.sections.get(name, Section(()))
+        frames = int(clips.clip_start[c + 1] - clips.clip_start[c])
+        taken = np.zeros(frames, dtype=bool)
+        hand = [x for x in section.lines if x.by_hand]
+        for x in hand:
+            taken[x.start : x.stop] = True
+        rest = [
+            piece
+            for x in section.lines
+            if not x.by_hand
+            for piece in _free_pieces(x, taken, claim=True)
+        ]
+        lines += sorted([*hand, *rest], key=lambda x: x.start)
+    return to_actions(lines, clips)
+
+
+# Writing -----------------------------------------------------------------------------------------
+
+
+def to_actions(lines: Iterable[Line], clips: ClipSet) -> Actions:
+    """Lines of a file, in order of clips and starts, as actions."""
+    lines = list(lines)
+    first = {n: int(a) for n, a in zip(clips.names, clips.clip_start)}
+    offset = np.array([first[x.clip] for x in lines], dtype=np.int64)
+    return Actions(
+        offset + np.array([x.start for x in lines], dtype=np.int64),
+        offset + np.array([x.stop for x in lines], dtype=np.int64),
+        np.array([KINDS.index(x.kind) for x in lines], dtype=np.int32),
+        np.array([NO_LIMB if x.limb == NONE else LIMBS.index(x.limb) for x in lines], np.int32),
+        np.array([DIRECTIONS.index(x.direction) for x in lines], dtype=np.int32),
+        tuple(x.label for x in lines),
+        clips.clip_start,
+    )
+
+
+def to_lines(actions: Actions, clips: ClipSet) -> list[Line]:
+    """Actions as lines of a file, as a program writes them."""
+    return [
+        Line(
+            clips.names[c],
+            int(a - clips.clip_start[c]),
+            int(b - clips.clip_start[c]),
+            KINDS[kind],
+            NONE if limb == NO_LIMB else LIMBS[limb],
+            DIRECTIONS[way],
+            "" if label == NONE else label,
+        )
+        for c, a, b, kind, limb, way, label in zip(
+            actions.clip,
+            actions.start,
+            actions.stop,
+            actions.kind,
+            actions.limb,
+            actions.direction,
+            actions.label,
+        )
+    ]
+
+
+def merge(
+    known: ActionFile | None, lines: Iterable[Line], clips: Iterable[ClipSet]
+) -> tuple[ActionFile, Kept]:
+    """A new analysis of clips, with all that a person has done to the file of the last one.
+
+    known: that file, checked against the clips, or None; lines: of the new analysis.
+    """
+    fresh: dict[str, list[Line]] = {}
+    for line in lines:
+        fresh.setdefault(line.clip, []).append(line)
+    kept = Kept()
+    sections = {}
+    for one in clips:
+        for name, frames in zip(one.names, np.diff(one.clip_start).tolist()):
+            old = known.sections.get(name, Section(())) if known else Section(())
+            taken = _uncovered(old, frames)
+            gaps = int(np.count_nonzero(np.diff(taken.astype(np.int8), prepend=0) == 1))
+            hand = [replace(x, number=None) for x in old.lines if x.by_hand]
+            for x in hand:
+                taken[x.start : x.stop] = True
+            new = _left_over(fresh.get(name, ()), taken, round(SLIVER * one.fps))
+            both = sorted([*hand, *new], key=lambda x: x.start)
+            sections[name] = Section(tuple(both), frames, one.fps, old.comments)
+            kept.lines += len(hand)
+            kept.gaps += gaps
+            kept.comments += len(old.comments)
+            kept.written += len(new)
+            if hand or gaps or old.comments:
+                kept.clips.append(name)
+    head = known.comments if known else ()
+    kept.comments += len(head)
+    return ActionFile(sections, head), kept
+
+
+def _left_over(lines: Iterable[Line], taken: np.ndarray, shortest: int) -> list[Line]:
+    """What is left of lines [frames that others have taken]; slivers go to the line they touch."""
+    out: list[Line] = []
+    waiting: Line | None = None
+    for x in lines:
+        for piece in _free_pieces(x, taken):
+            if waiting is not None and waiting.stop == piece.start:
+                piece = replace(piece, start=waiting.start)
+                waiting = None
+            elif waiting is not None:
+                out.append(waiting)
+                waiting = None
+            whole = piece.stop - piece.start >= min(shortest, x.stop - x.start)
+            if whole:
+                out.append(piece)
+            elif out and out[-1].stop == piece.start:
+                out[-1] = replace(out[-1], stop=piece.stop)
+            else:
+                waiting = piece
+    return out if waiting is None else [*out, waiting]
+
+
+def _uncovered(section: Section, frames: int) -> np.ndarray:
+    """Frames [F] bool of a clip that a person has taken out."""
+    out = np.zeros(frames, dtype=bool)
+    if section.frames is not None:
+        out[: section.frames] = True
+        for x in section.lines:
+            out[x.start : x.stop] = False
+    return out
+
+
+def _free_pieces(line: Line, taken: np.ndarray, *, claim: bool = False) -> list[Line]:
+    """What is left of a line where other lines have taken frames; claim: take what is left."""
+    free = ~taken[line.start : line.stop]
+    edges = np.flatnonzero(np.diff(free.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
+    if claim:
+        taken[line.start : line.stop] = True
+    return [
+        replace(line, start=line.start + a, stop=line.start + b, number=None)
+        for a, b in edges.tolist()
+    ]
+
+
+def write_actions(path: Path | str, actions: Actions, clips: ClipSet) -> None:
+    """Write actions as a program does: no line counts as a person's.
+
+    Frames of a clip that no action covers count as taken out. Errors: a file that cannot be
+    written.
+    """
+    write(path, merge(None, to_lines(actions, clips), [clips])[0])
+
+
+def write(path: Path | str, content: ActionFile) -> None:
+    """Write a file whole, or not at all. Errors: it cannot be written."""
+    with files.writing(path) as temporary:
+        temporary.write_text(_text(content), encoding="utf-8", newline="\n")
+
+
+def _text(content: ActionFile) -> str:
+    words = [x.words for s in content.sections.values() for x in s.lines]
+    width = [max((len(row[k]) for row in words), default=0) for k in range(7)]
+    out = [f"{OURS} {line}" for line in _HELP] + list(content.comments)
+    for name, section in content.sections.items():
+        out += ["", f"{HEADING} {_quoted(name)}  {section.frames} frames  {section.fps!r} a second"]
+        waiting = sorted(section.comments, key=lambda c: c[0])
+        for x in section.lines:
+            while waiting and waiting[0][0] <= x.start:
+                out.append(waiting.pop(0)[1])
+            row = "  ".join(
+                w.rjust(n) if k in (1, 2) else w.ljust(n)
+                for k, (w, n) in enumerate(zip(x.words, width))
+            )
+            end = "" if x.by_hand else f"  {x.check}"
+            out.append(f"{row}{end}{'  ' + x.comment if x.comment else ''}".rstrip())
+        out += [c for _, c in waiting]
+    return "\n".join(out) + "\n"
+
+
+def _quoted(word: str) -> str:
+    """A word as it stands in a file."""
+    plain = word and not re.search(r'[\s#"]', word) and word != HEADING
+    return word if plain and word.isprintable() else json.dumps(word, ensure_ascii=True)
