@@ -22,7 +22,7 @@ from kumite.annotate import (
     read_actions,
     write_actions,
 )
-from kumite.annotate.action_file import ActionFile, Line, Section, merge, parse, to_lines, write
+from kumite.annotate.action_file import ActionFile, Line, Section, merge, parse, write
 from kumite.annotate.action_score import score_actions, true_boundaries
 from kumite.annotate.segments import Cut, CutSettings, find_cuts, find_motion
 from kumite.cli import app
@@ -105,7 +105,8 @@ def some(**changes) -> Actions:
         "label": ("jab", "idle"),
         "clip_start": [0, 20],
     }
-    return Actions(**{k: np.array(v) if k != "label" else v for k, v in (values | changes).items()})
+    both = values | changes
+    return Actions(label=both.pop("label"), **{k: np.array(v) for k, v in both.items()})
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 ::
 
-    == jab_left  1251 frames  30 a second
+    == jab_left  1251 frames  30.0 a second
     jab_left    0   41  idle    -          none      idle                 d3c0f1
     jab_left   41   83  attack  left_hand  straight  left_hand_straight   5e12aa
 

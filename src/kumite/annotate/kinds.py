@@ -29,7 +29,7 @@ class KindSettings:
     snap: float = 10.0  # rad/s² of the head's turn, above what the clip is used to: it was hit
     restless_snap: float = 4.0  # how often over the clip's own level it must be
     trunk: float = 0.6  # rad/s of the chest against the pelvis, above what the clip is used to
-    restless_trunk: float = 2.0
+    restless_trunk: float = 2.0  # how often over the clip's own level it must be
     arm: float = 25.0  # m/s² of a fist seen from the head: arms that swing in a run do not reach it
     far: float = 0.6  # m: further than this nobody goes in a slip or a block
     turned: float = 0.3  # rad: nor turns
@@ -72,7 +72,7 @@ def find_trajectories(
     arm = np.linalg.norm(fist, axis=2).max(axis=1)
     owner = clips.clip_of_frame
     height = motion.position[:, PELVIS, 1] / motion.standing[owner]
-    airborne = ~contacts.on_ground.any(axis=1)
+    airborne = ~(contacts.on_ground[:, 0] | contacts.on_ground[:, 1])
     rows = []
     for a, b in zip(start.tolist(), stop.tolist()):
         at = planar_apply(planar_inverse(clips.facing[a]), motion.position[a:b])
@@ -170,7 +170,7 @@ def _defence(t: Trajectories, k: int, ducks: bool, settings: KindSettings) -> st
 
 
 def strike_directions(clips: ClipSet, strikes: Strikes) -> list[str]:
-    """How each blow [X] goes: straight, hook, uppercut, kick, slash or thrust; "" of a running foot."""
+    """How each blow [X] goes, by the ways of an attack; "" where a foot only runs."""
     position, world = clips.world
     weapon = clips.skeleton.roles.get("sword")
     out = []

@@ -85,8 +85,6 @@ class Motion:
     standing: np.ndarray  # [C] m, height of the pelvis in guard
     quiet: np.ndarray  # [F] m/s, the measure that rests are told by
     away: np.ndarray  # [F] m from the clip's guard, of the joint that is farthest
-    pose: np.ndarray  # [F, 7, 3] m, pelvis from the feet's middle and UPPER from the pelvis, facing
-    guard: np.ndarray  # [C, 7, 3] m, the same of each clip's guard
     upper: np.ndarray  # [F] m/s², root mean square of the accelerations of trunk and arms
 
 
@@ -109,16 +107,13 @@ def find_motion(clips: ClipSet) -> Motion:
     pose = planar_apply(to_facing[:, None], position[:, UPPER])
     feet = planar_apply(to_facing, position[:, FEET].mean(axis=1))
     pose[:, PELVIS, [0, 2]] -= feet[:, [0, 2]]
-    pose[:, 1:, [0, 2]] -= pose[:, :1, [0, 2]] + feet[:, None, [0, 2]] - feet[:, None, [0, 2]]
     away = np.zeros(len(clips))
     guard = np.zeros((len(bounds), *pose.shape[1:]))
     for c, (a, b) in enumerate(bounds):
         calm = quiet[a:b] <= np.percentile(quiet[a:b], CALM)
         guard[c] = np.median(pose[a:b][calm], axis=0)
         away[a:b] = np.linalg.norm(pose[a:b] - guard[c], axis=2).max(axis=1)
-    return Motion(
-        position, velocity, acceleration, guard[:, PELVIS, 1], quiet, away, pose, guard, upper
-    )
+    return Motion(position, velocity, acceleration, guard[:, PELVIS, 1], quiet, away, upper)
 
 
 def _squared(x: np.ndarray) -> np.ndarray:
@@ -196,7 +191,7 @@ def _rests(
 
 def _stands(on_ground: np.ndarray, fps: float, settings: CutSettings) -> np.ndarray:
     """Frames [F] of double support that is more than a gait's, from step to step."""
-    both = on_ground.all(axis=1)
+    both = on_ground[:, 0] & on_ground[:, 1]
     for a, b in _runs(both).tolist():
         if b - a < settings.stand * fps and a > 0 and b < len(both):
             both[a:b] = False
