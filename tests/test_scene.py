@@ -114,6 +114,7 @@ def _first_struck(aside: float = 0.0, *, throws: bool = False, arms: bool = True
         np.full((2, 4), kernels.NO_BLOW),
         np.full((2, 4), kernels.NO_BLOW),
         np.zeros((2, 4), bool),
+        np.ones(2, bool),
         np.full((2, 4), kernels.NO_HIT),
         np.zeros((2, 4)),
     )

@@ -118,8 +118,11 @@ class Skill:
             np.concatenate([p.value.ravel() for p in self.policies]),
             np.concatenate([[0], np.cumsum(sizes)]),
             np.array([p.value.shape[1] for p in self.policies]),
-            *(np.stack([g[c] for g in grids]) for c in range(3)),
-            *(np.array([g[c] for g in grids]) for c in (3, 4)),
+            np.stack([g[0] for g in grids]),
+            np.stack([g[1] for g in grids]),
+            np.stack([g[2] for g in grids]),
+            np.array([g[3] for g in grids]),
+            np.array([g[4] for g in grids]),
             np.array([b.grid.heading for b in every]),
         )
 
