@@ -1,9 +1,9 @@
-"""Behaviours are data: three of your own, weighed against each other while the scene runs."""
+"""Behaviours are data: four of your own, weighed against each other while the scene runs."""
 
 import numpy as np
 
 from kumite import LiveScene, builtin_library, load_scene
-from kumite.control import Behaviour, Station, approach_grid
+from kumite.control import Behaviour, Station, approach_grid, heading_grid
 
 grid = approach_grid()  # where the target may be: all round, 2 m
 behaviours = {
@@ -18,6 +18,10 @@ behaviours = {
     ),
     # Get away from it.
     "flee": Behaviour("flee", grid, station=Station(distance=3.0, sigma=0.8, always=True)),
+    # Stand where it is and face the way it faces: its heading is a third axis of the grid.
+    "be_there": Behaviour(
+        "be_there", heading_grid(), station=Station(heading=0.0, sigma=0.15, always=True)
+    ),
 }
 scene = LiveScene(load_scene("target"), builtin_library(None), behaviours=behaviours)
 weights = {control.behaviour: control for control in scene.controls}
@@ -36,7 +40,7 @@ def away_and_round(seconds: float) -> tuple[float, float]:
     return float(np.hypot(x, z)), turned
 
 
-for name in ("prowl", "flee", "stand_off"):
+for name in ("prowl", "flee", "stand_off", "be_there"):
     weights[name].set(6.0)
     for other, control in weights.items():
         if other != name:

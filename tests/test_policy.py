@@ -19,11 +19,13 @@ from kumite.control import (
     approach,
     approach_grid,
     circle,
+    heading_grid,
     keep_off,
     solve,
     stretch_tracks,
     strike,
     strike_grid,
+    take_place,
     trained,
 )
 from kumite.control.policy import frame_discount, stretch_rewards
@@ -31,6 +33,7 @@ from kumite.errors import KumiteError
 from kumite.graph import ActionTable, Library
 from kumite.kernels import look_ahead as look
 from kumite.kernels import policy as kernels
+from kumite.rotation import planar_compose, planar_inverse
 from tests import reference, toys
 
 FPS = 30.0
@@ -378,6 +381,41 @@ def test_keeping_off_backs_away_and_circling_goes_round(library: Library):
             assert np.hypot(target[0, 0], target[0, 2]) > 1.35
         else:
             assert turned > 0.3
+
+
+def test_a_place_is_reached_and_its_way_faced(library: Library):
+    """Greedy steps of take_place bring the avatar near the place, and round to its heading."""
+    place = take_place()
+    skill = Skill(
+        library,
+        solve(library, approach()),
+        solve(library, strike(library)),
+        stretch_tracks(library),
+        (solve(library, place),),
+    )
+    temper = Temper(
+        0.0, 0.0, personal_space=0.0, facing=0.0, few=1, boredom=0.0, more={"take_place": 1.0}
+    )
+    far = np.full((1, 1, 2), 1e6)
+    off, turned = [], []
+    for yaw in np.radians([0.0, 90.0, 180.0, -90.0]):
+        mind, state, here = Fighters(skill, [temper], 0), 0, np.zeros(3)
+        there = np.array([0.6, 1.0, yaw])
+        for _ in range(14):
+            x, z, heading = planar_compose(planar_inverse(here), there)
+            k = mind.pick(0, state, np.array([[x, 1.5, z, heading]]), far)
+            here = planar_compose(here, library.table.displacement[k])
+            state = int(library.table.target[k])
+        off.append(np.hypot(*(here - there)[:2]))
+        turned.append(abs((here[2] - yaw + np.pi) % (2 * np.pi) - np.pi))
+    assert np.median(off) < 0.3 and np.median(turned) < np.radians(45)
+
+
+def test_headings_need_a_grid_of_headings():
+    with pytest.raises(KumiteError, match="needs a grid of headings"):
+        Behaviour("mine", approach_grid(), station=Station(heading=0.0))
+    with pytest.raises(KumiteError, match="needs a grid of headings"):
+        Behaviour("mine", heading_grid(), station=Station())
 
 
 def test_a_behaviour_counts_only_in_its_active_region(library: Library):

@@ -1,7 +1,7 @@
 """Controllers: given what a character sees, choose its next action."""
 
 from kumite.control.fighter import Fighters, Skill, Temper
-from kumite.control.grid import TargetGrid, approach_grid, strike_grid
+from kumite.control.grid import TargetGrid, approach_grid, heading_grid, strike_grid
 from kumite.control.policy import (
     BEHAVIOURS,
     Behaviour,
@@ -13,6 +13,7 @@ from kumite.control.policy import (
     solve,
     stretch_tracks,
     strike,
+    take_place,
 )
 from kumite.control.trained import cache_folder, trained
 from kumite.control.worth import Worth, measure_worth
@@ -31,11 +32,13 @@ __all__ = [
     "approach_grid",
     "cache_folder",
     "circle",
+    "heading_grid",
     "keep_off",
     "measure_worth",
     "solve",
     "stretch_tracks",
     "strike",
     "strike_grid",
+    "take_place",
     "trained",
 ]
