@@ -10,7 +10,7 @@ NO_HIT = -1
 NO_BLOW = -1
 NOBODY = -1
 NO_LIMB = -1
-SQUARELY = np.cos(np.radians(45.0))  # how a blow must meet an arm; else it glances off
+SQUARELY = np.cos(np.radians(30.0))  # how a blow must meet an arm; else it glances off
 REFINEMENTS = 8  # halvings of the step in which contact begins
 
 
