@@ -12,21 +12,16 @@ from kumite.clip import SIDES, Skeleton
 from kumite.graph import Library
 from kumite.kernels import character as kernels
 from kumite.kernels.blow import NO_BLOW
-from kumite.rotation import conjugate, planar_compose, planar_inverse, rotate
+from kumite.rotation import planar_compose, planar_inverse
+from kumite.synthesis.recoil import RATE, REACTION_HALF_LIFE, give_way
 
 # Of a difference at rest a critically damped spring leaves 60 % after one of its half-lives, 24 %
 # after two, 8 % after three (the exponential of its rate halves twice in each).
 JOIN_HALF_LIFE = 0.10  # s, for the difference of the joints at a join
 ROOT_HALF_LIFE = 0.20  # s, the same for the root: its speed must not be felt to jump
-REACTION_HALF_LIFE = 0.16  # s, in which a struck body recovers
 LONGEST_FOOT_OFFSET = 0.30  # m that a planted foot may stand away from where the capture has it
 SPRINGS = kernels.Springs(JOIN_HALF_LIFE, ROOT_HALF_LIFE, REACTION_HALF_LIFE, LONGEST_FOOT_OFFSET)
 BLOW_BEFORE, BLOW_AFTER = 0.07, 0.12  # s around the effective frames in which a blow may land
-SHARES = 3.0  # how much more readily each joint from the pelvis out gives way than the one before
-DAMPING = 0.02  # of the step of inverse kinematics: no joint whirls where none can give way
-MOST_GIVEN = 0.6  # rad that a joint gives way, however hard or often it is struck
-MOST_BENT = np.radians(150.0)  # of an elbow
-STRAIGHT = np.radians(6.0)  # an elbow bent less is straight: it locks, the shoulder gives way
 
 
 class Cast:
@@ -79,10 +74,6 @@ class Cast:
             self._offsets,
             kernels.Poses(self.root_position, self.wxyz, self.position, self.world_wxyz),
         )
-        arms = [
-            [skeleton.joint(f"{s}_{p}") for p in ("upper_arm", "forearm", "hand")] for s in SIDES
-        ]
-        self._elbow = {joint: arm for arm in arms for joint in arm[1:]}
 
     @property
     def contacts(self) -> np.ndarray:
@@ -129,67 +120,22 @@ class Cast:
     def strike(self, k: int, joint: int, point: np.ndarray, displacement: np.ndarray) -> None:
         """Displace a struck segment: ``point`` moves by about ``displacement`` [3] and recovers.
 
-        One damped Jacobian step of inverse kinematics over the joints from the pelvis to the struck
-        one, the outer ones giving way more readily (Lee & Lee 2004, section 6, reaction), played by
-        a critically damped spring that peaks there. An elbow is a hinge that only bends: a blow
-        that would open it is left to the shoulder.
+        The joints below give way (:func:`give_way`), played by a critically damped spring from
+        rest that peaks there.
         """
-        skeleton = self.library.clips.skeleton
-        arm = self._elbow.get(joint)
-        # A waist may be the pelvis itself.
-        chain = skeleton.trunk(arm[0] if arm else joint) or [joint]
-        levers = point - self.position[k, chain]
-        axes, owner = np.tile(np.eye(3), (len(chain), 1)), np.repeat(np.arange(len(chain)), 3)
-        room = np.full(len(chain), MOST_GIVEN)
-        turn = _step(axes, owner, levers, displacement)
-        if arm:
-            bend, hinge = self._bend(k, arm)
-            elbow = len(chain)
-            more = _step(
-                np.vstack([axes, hinge]),
-                np.append(owner, elbow),
-                np.vstack([levers, point - self.position[k, arm[1]]]),
-                displacement,
-            )
-            if bend > STRAIGHT and more[elbow] @ hinge > 0.0:
-                chain, turn = [*chain, arm[1]], more
-                room = np.append(room, min(MOST_GIVEN, max(MOST_BENT - bend, 0.0)))
-        local = rotate(conjugate(self.world_wxyz[k, chain]), turn)
-        # The spring from rest peaks at its first velocity over e times its rate.
-        peak = np.e * 2.0 * np.log(2.0) / REACTION_HALF_LIFE
-        velocity = self._offsets.reaction_velocity[k, chain] + local * peak
-        room = peak * np.maximum(room - _length(self._offsets.reaction[k, chain]), 0.0)
-        velocity *= np.minimum(1.0, room / np.maximum(_length(velocity), 1e-9))[:, None]
+        chain, turn, most = give_way(
+            self.library.clips.skeleton,
+            self.position[k],
+            self.world_wxyz[k],
+            joint,
+            point,
+            displacement,
+        )
+        velocity = self._offsets.reaction_velocity[k, chain] + turn * np.e * RATE
+        left = np.maximum(most - np.linalg.norm(self._offsets.reaction[k, chain], axis=1), 0.0)
+        speed = np.maximum(np.linalg.norm(velocity, axis=1), 1e-9)
+        velocity *= np.minimum(1.0, np.e * RATE * left / speed)[:, None]
         self._offsets.reaction_velocity[k, chain] = velocity
-
-    def _bend(self, k: int, arm: list[int]) -> tuple[float, np.ndarray]:
-        """How far [rad] an elbow is bent, and the axis [3] about which its forearm bends more."""
-        shoulder, elbow, wrist = self.position[k, arm]
-        upper, fore = elbow - shoulder, wrist - elbow
-        hinge = np.cross(upper, fore)
-        sine = float(np.linalg.norm(hinge))
-        return float(np.arctan2(sine, upper @ fore)), hinge / max(sine, 1e-9)
-
-
-def _length(v: np.ndarray) -> np.ndarray:
-    return np.linalg.norm(v, axis=-1)
-
-
-def _step(
-    axes: np.ndarray, owner: np.ndarray, levers: np.ndarray, displacement: np.ndarray
-) -> np.ndarray:
-    """Turns [N, 3] of joints that move a point by about ``displacement`` [3], least squares.
-
-    axes [M, 3]: about which joint owner [M] may turn; levers [N, 3]: from the joints to the point.
-    """
-    moves = np.cross(axes, levers[owner])
-    ready = SHARES ** owner[:, None] * moves
-    normal = moves.T @ ready
-    normal += DAMPING * np.trace(normal) * np.eye(3) + 1e-9 * np.eye(3)
-    angle = ready @ np.linalg.solve(normal, displacement)
-    turn = np.zeros_like(levers)
-    np.add.at(turn, owner, angle[:, None] * axes)
-    return turn
 
 
 def _below(skeleton: Skeleton, legs: list[list[int]]) -> np.ndarray:
