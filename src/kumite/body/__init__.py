@@ -1,5 +1,6 @@
 """The body laid on a skeleton: capsules that can be hit and weighed, and a skin that is seen."""
 
+from kumite.body.apart import Apart, keep_out
 from kumite.body.mesh import ROLES, BodyMesh, body_mesh, skin_vertices
 from kumite.body.palette import PALETTES, Palette, palette
 from kumite.body.segments import ARMS, PARTS, Body, lay_body
@@ -9,10 +10,12 @@ __all__ = [
     "PALETTES",
     "PARTS",
     "ROLES",
+    "Apart",
     "Body",
     "BodyMesh",
     "Palette",
     "body_mesh",
+    "keep_out",
     "lay_body",
     "palette",
     "skin_vertices",

@@ -245,6 +245,67 @@ def join(k, frame_from, frame_to, anchor, capture, offsets):
 
 
 @kernel
+def turned_rate(turn, velocity, out):
+    """Rate of a rotation vector whose rotation turns with ``velocity`` [rad/s], in turned axes.
+
+    The inverse of the right Jacobian of the exponential: v + turn × v / 2 + c turn × (turn × v).
+    """
+    angle = np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
+    if angle > 1e-3:
+        c = 1.0 / angle**2 - 0.5 / (angle * np.tan(0.5 * angle))
+    else:
+        c = 1.0 / 12.0
+    once = np.cross(turn, velocity)
+    twice = np.cross(turn, once)
+    for i in range(3):
+        out[i] = velocity[i] + 0.5 * once[i] + c * twice[i]
+
+
+@kernel
+def adopt(k, frame, anchor, shown, moving, ankles, stepping, capture, offsets):
+    """Let character k go on from a pose of its own as if it had come to a frame, in place.
+
+    shown [J + 1, 4]: the root's place (and one number more), then local rotations; moving
+    [J + 1, 3]: their velocities, m/s and rad/s in joint axes; ankles, stepping [2, 3]: where the
+    pose has them and how they move. The anchor [K, 3] is the one under which the frame is played.
+    All that differs from the capture goes into the offsets: place and velocity stay.
+    """
+    here = anchor[k]
+    past = frame - 1
+    if past < 0 or capture.clip_of_frame[past] != capture.clip_of_frame[frame]:
+        past = frame
+    place, base, v, back = np.empty(3), np.empty(4), np.empty(3), np.empty(4)
+    carried, none = np.empty(3), np.zeros(3)
+    anchored_root(here, capture.root[frame], capture.wxyz[frame, 0], place, base)
+    for j in range(capture.wxyz.shape[1]):
+        if j > 0:
+            base[:] = capture.wxyz[frame, j]
+        turn = offsets.joint[k, j]
+        difference(base, shown[1 + j], turn)
+        difference(capture.wxyz[past, j], capture.wxyz[frame, j], v)
+        exponential(-turn, back)
+        add_rotated(back, v, none, carried)  # the capture's own, in the axes of the pose shown
+        for c in range(3):
+            carried[c] = moving[1 + j, c] - carried[c] * capture.fps
+        turned_rate(turn, carried, offsets.joint_velocity[k, j])
+    for c in range(3):
+        offsets.root[k, c] = shown[0, c] - place[c]
+        offsets.root_velocity[k, c] = moving[0, c]
+    add_movement(capture.root, past, frame, here, -capture.fps, offsets.root_velocity[k])
+    for f in range(2):
+        ankle = capture.ankle[:, f]
+        x, z = planar_point(here, ankle[frame, 0], ankle[frame, 2])
+        offsets.foot[k, f, 0] = ankles[f, 0] - x
+        offsets.foot[k, f, 1] = ankles[f, 1] - ankle[frame, 1]
+        offsets.foot[k, f, 2] = ankles[f, 2] - z
+        for c in range(3):
+            offsets.foot_velocity[k, f, c] = stepping[f, c]
+        add_movement(ankle, past, frame, here, -capture.fps, offsets.foot_velocity[k, f])
+    offsets.reaction[k] = 0.0
+    offsets.reaction_velocity[k] = 0.0
+
+
+@kernel
 def product(aw, ax, ay, az, bw, bx, by, bz):
     """Hamilton product of two quaternions, in scalars: no array is made for it."""
     return (

@@ -1,5 +1,17 @@
 """From choices to poses: joins, foot lock, reactions."""
 
 from kumite.synthesis.cast import Cast
+from kumite.synthesis.moment import Moment
+from kumite.synthesis.ragdoll import Pushed, Ragdoll, Tone, blow_impulse
+from kumite.synthesis.response import Responses, find_responses
 
-__all__ = ["Cast"]
+__all__ = [
+    "Cast",
+    "Moment",
+    "Pushed",
+    "Ragdoll",
+    "Responses",
+    "Tone",
+    "blow_impulse",
+    "find_responses",
+]

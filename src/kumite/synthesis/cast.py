@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from kumite.clip import SIDES, Skeleton
+from kumite.clip import SIDES, Skeleton, facing_frame
+from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.kernels import character as kernels
 from kumite.kernels.blow import NO_BLOW
 from kumite.rotation import planar_compose, planar_inverse
+from kumite.synthesis.moment import Moment
 from kumite.synthesis.recoil import RATE, REACTION_HALF_LIFE, give_way
 
 # Of a difference at rest a critically damped spring leaves 60 % after one of its half-lives, 24 %
@@ -101,6 +103,40 @@ class Cast:
     def begin(self, who: np.ndarray, stretch: np.ndarray) -> None:
         """Characters who [W] take actions, stretches [K], from the states they are in."""
         kernels.begin(who, stretch, self.played)
+
+    def adopt(self, k: int, frame: int, last: int, now: Moment) -> None:
+        """Let a character go on from a pose of its own along library frames.
+
+        It stands where ``now`` does, shows that pose at its next :meth:`show` of no time, and from
+        there plays the frames after ``frame`` up to ``last`` (where it waits for a choice):
+        the facing frames lie on each other, pose and velocity are continuous, and what differs
+        fades as after a join. Errors: frames that are no stretch of one clip; another skeleton.
+        """
+        clips = self.library.clips
+        if not (0 <= frame <= last < len(clips)) or (
+            clips.clip_of_frame[frame] != clips.clip_of_frame[last]
+        ):
+            raise KumiteError(f"cast: frames {frame} to {last} are no part of one clip")
+        if len(now.wxyz) != len(clips.skeleton):
+            raise KumiteError(
+                f"cast: a pose of {len(now.wxyz)} joints, expected {len(clips.skeleton)}"
+            )
+        facing = facing_frame(clips.skeleton, now.root_position[None], now.wxyz[None])[0]
+        self.frame[k], self.stop[k] = frame, last
+        self.anchor[k] = planar_compose(facing, planar_inverse(clips.facing[frame]))
+        position, velocity = now.joints(clips.skeleton)
+        feet = [clips.skeleton.joint(f"{side}_foot") for side in SIDES]
+        kernels.adopt(
+            k,
+            frame,
+            self.anchor,
+            np.concatenate([[[*now.root_position, 0.0]], now.wxyz]),
+            np.concatenate([now.root_velocity[None], now.joint_velocity]),
+            position[feet],
+            velocity[feet],
+            self._capture,
+            self._offsets,
+        )
 
     def advance(self) -> None:
         """Everyone one frame on, along the action begun."""

@@ -15,10 +15,10 @@ from kumite import rotation
 from kumite.body import Body
 from kumite.body.stance import FRONT, LEFT, stand
 from kumite.clip import REQUIRED_ROLES, SIDES, Skeleton
-from kumite.rotation import conjugate, multiply, rotate
+from kumite.rotation import conjugate, multiply
 
-# Degrees from neutral, by the role of the joint: the active ranges of adults in Norkin & White,
-# Measurement of Joint Motion, rounded up to cones.
+# Degrees from neutral, by the role of the joint. Chosen: cones that hold what captured people do
+# and keep a limb from folding through itself; a motion that goes beyond widens them.
 RANGE_DEG = {
     "chest": 45,
     "neck": 50,
@@ -111,7 +111,8 @@ def mjcf(skeleton: Skeleton, body: Body, step: float, gravity: float) -> str:
     """The model: bodies ``j0`` … with geoms ``p0`` …, the plane ``ground``, pins ``pin0`` ….
 
     step [s], gravity [m/s²]. Collisions are those of every part with the ground and of
-    :func:`strangers`. Pins hold the feet, where there are feet, to bodies that the caller puts where they stand.
+    :func:`strangers`. Pins hold the feet, where there are feet, to bodies that the caller puts
+    where they stand.
     """
     neutral, angles = neutral_pose(skeleton), ranges(skeleton)
     root = ET.Element("mujoco", model="ragdoll")
