@@ -255,10 +255,13 @@ def turned_rate(turn, velocity, out):
         c = 1.0 / angle**2 - 0.5 / (angle * np.tan(0.5 * angle))
     else:
         c = 1.0 / 12.0
-    once = np.cross(turn, velocity)
-    twice = np.cross(turn, once)
-    for i in range(3):
-        out[i] = velocity[i] + 0.5 * once[i] + c * twice[i]
+    x, y, z = turn[0], turn[1], turn[2]
+    ax = y * velocity[2] - z * velocity[1]
+    ay = z * velocity[0] - x * velocity[2]
+    az = x * velocity[1] - y * velocity[0]
+    out[0] = velocity[0] + 0.5 * ax + c * (y * az - z * ay)
+    out[1] = velocity[1] + 0.5 * ay + c * (z * ax - x * az)
+    out[2] = velocity[2] + 0.5 * az + c * (x * ay - y * ax)
 
 
 @kernel

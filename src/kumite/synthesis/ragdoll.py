@@ -44,7 +44,7 @@ EFFECTIVE_MASS = {"hand": 2.9, "foot": 4.3}  # kg
 CONTACT = 0.010  # s: with half a sine 26.5 N s peak at 4.2 kN, of the order measured there
 GROUND = -1  # in the place of a part, of a pair that may collide
 STEP = 0.002  # s, at most, of physics
-FASTEST = 150.0  # m/s or rad/s at which a simulation has blown up; a hard blow gives some 30
+FASTEST = 300.0  # m/s or rad/s at which a simulation has blown up; the hardest blows give half
 HARDEST = 400.0  # m/s² or rad/s² that inverse dynamics follows: what is more is a jump, not motion
 RECOIL = 0.018 / EFFECTIVE_MASS["hand"]  # m per N s that a struck segment gives without physics
 
@@ -88,6 +88,7 @@ class Pushed:
     deviation: np.ndarray  # [T] m, mean distance of the joints from where they would have been
     kinetic: np.ndarray  # [T] J, of the whole body
     end: Moment  # the last frame, and how it moves
+    impulse: np.ndarray  # [3] N s that the body took of the blow
     slip: float  # m that the most moved planted foot is away from where it stood, at worst
     physical: bool  # False: the solver failed, the motion gives way kinematically instead
     why: str = ""  # it failed
@@ -101,13 +102,15 @@ class Pushed:
             wxyz=(float, (frames, joints, 4)),
             deviation=(float, (frames,)),
             kinetic=(float, (frames,)),
+            impulse=(float, (3,)),
         )
 
 
 def blow_impulse(velocity: np.ndarray, limb: str = "hand") -> np.ndarray:
     """The impulse [3] N s of a limb that lands at a velocity [3] m/s relative to what it hits.
 
-    Effective mass × speed; limb is "hand" or "foot", with or without its side.
+    Effective mass × speed, against a part as heavy as a head; a lighter one takes less of it, as
+    :meth:`Ragdoll.push` sees to. limb is "hand" or "foot", with or without its side.
     """
     return EFFECTIVE_MASS[mjcf.kind_of(limb)] * np.asarray(velocity, dtype=np.float64)
 
@@ -171,13 +174,17 @@ class Ragdoll:
         point: np.ndarray,
         impulse: np.ndarray,
         seconds: float,
+        *,
+        striking_mass: float = EFFECTIVE_MASS["hand"],
     ) -> Pushed:
         """What a blow does to a body, for some time.
 
         now: the pose struck. targets: roots [T, 3] and rotations [T, J, 4] that it would have shown
         in the frames that follow; the last is held if the time is longer. planted [2] bool: feet
         that stay where they are. joint: struck, at ``point`` [3] m of the world, by ``impulse``
-        [3] N s. seconds: how long, a frame at the least.
+        [3] N s. seconds: how long, a frame at the least. striking_mass: kg behind the impulse,
+        which is cut so that the struck point leaves no faster than the blow came; 0 takes it as it
+        is.
 
         Errors: shapes or numbers that make no push. A simulation that fails is no error: the answer
         then says so and gives way kinematically.
@@ -189,6 +196,8 @@ class Ragdoll:
         try:
             # Overflow on the way to a blow-up is seen by the test for it, not by a warning.
             with np.errstate(all="ignore"):
+                self._set_up(now, roots, turns, held)
+                impulse = impulse * self._share(joint, point, impulse, striking_mass)
                 return self._simulate(now, roots, turns, held, joint, point, impulse)
         except _BlownUp as failure:
             return self._given_way(now, roots, turns, joint, point, impulse, str(failure))
@@ -292,11 +301,26 @@ class Ragdoll:
                 found.append(j)
         return [j for j in found if j is not None]
 
+    def _share(self, joint: int, point: np.ndarray, impulse: np.ndarray, striking: float) -> float:
+        """How much (0..1) of an impulse the struck point takes before it flees as fast as the blow.
+
+        A point of effective mass m (1/m = n J M⁻¹ Jᵀ n along the blow n) leaves at impulse / m.
+        """
+        size = float(np.linalg.norm(impulse))
+        if size == 0.0 or striking <= 0.0:
+            return 1.0
+        mj, m, d = self._mj, self._model, self._data
+        jacobian, easing = np.empty((3, m.nv)), np.empty((1, m.nv))
+        body = mj.mj_name2id(m, mj.mjtObj.mjOBJ_BODY, f"j{joint}")
+        mj.mj_jac(m, d, jacobian, None, point, body)
+        along = (impulse / size) @ jacobian
+        mj.mj_solveM(m, d, easing, along[None])
+        return min(1.0, 1.0 / max(float(along @ easing[0]) * striking, 1e-12))
+
     # Moving ------------------------------------------------------------------------------------
 
     def _simulate(self, now, roots, turns, held, joint, point, impulse) -> Pushed:
         mj, m, d = self._mj, self._model, self._data
-        self._set_up(now, roots, turns, held)
         states, speeds, accelerations = self._wanted(now, roots, turns)
         dt, nv, frames = self.dt, m.nv, len(roots)
         mass = np.empty((nv, nv))
@@ -357,7 +381,7 @@ class Ragdoll:
                 slip = max(slip, float(np.linalg.norm(moved, axis=1).max()))
         deviation = np.linalg.norm(position - meant, axis=-1).mean(axis=-1)
         end = Moment(out_root[-1], out_wxyz[-1], d.qvel[:3], d.qvel[3:].reshape(-1, 3))
-        return Pushed(out_root, out_wxyz, deviation, kinetic, end, slip, True)
+        return Pushed(out_root, out_wxyz, deviation, kinetic, end, impulse, slip, True)
 
     def _given_way(self, now, roots, turns, joint, point, impulse, why: str) -> Pushed:
         """The kinematic answer: the motion goes on, and the joints below the blow give."""
@@ -371,7 +395,8 @@ class Ragdoll:
         position, _ = forward_kinematics(self.skeleton, roots, out)
         meant, _ = forward_kinematics(self.skeleton, roots, turns)
         deviation = np.linalg.norm(position - meant, axis=-1).mean(axis=-1)
-        return Pushed(roots, out, deviation, np.zeros(len(roots)), end, 0.0, False, why)
+        still = np.zeros(len(roots))
+        return Pushed(roots, out, deviation, still, end, impulse, 0.0, False, why)
 
 
 class _BlownUp(Exception):
