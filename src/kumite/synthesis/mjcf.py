@@ -118,9 +118,7 @@ def mjcf(skeleton: Skeleton, body: Body, step: float, gravity: float) -> str:
     root = ET.Element("mujoco", model="ragdoll")
     # Capsules overlap at the joints; inertia is the parts' own, whatever hangs at their ends.
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
-    option = ET.SubElement(root, "option", timestep=repr(step), gravity=_text((0, -gravity, 0)))
-    # A blow-up is ours to see: MuJoCo would start again from the neutral pose.
-    ET.SubElement(option, "flag", autoreset="disable")
+    ET.SubElement(root, "option", timestep=repr(step), gravity=_text((0, -gravity, 0)))
     world = ET.SubElement(root, "worldbody")
     up = rotation.between([0, 0, 1], [0, 1, 0])
     ET.SubElement(world, "geom", _inert("ground"), type="plane", size="0 0 1", quat=_text(up))

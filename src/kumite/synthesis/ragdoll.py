@@ -20,7 +20,7 @@ what overlaps in the motion already may go as deep as there, no deeper.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -33,9 +33,6 @@ from kumite.kernels.overlap import overlaps
 from kumite.synthesis import mjcf
 from kumite.synthesis.moment import Moment
 from kumite.synthesis.recoil import recoiling
-
-if TYPE_CHECKING:
-    import mujoco
 
 # Olympic boxers' straight punches to a dummy's face: hand 9.14 ± 2.06 m/s, effective mass
 # 2.9 ± 2.0 kg, 3427 N at the peak (Walilko, Viano & Bir, Br J Sports Med 39:710, 2005, abstract).
@@ -150,10 +147,8 @@ class Ragdoll:
         self.tone = tone or Tone()
         self._rate = self.tone.of_joints(skeleton)
         self._neutral = mjcf.neutral_pose(skeleton)
-        self._model: mujoco.MjModel = mj.MjModel.from_xml_string(
-            mjcf.mjcf(skeleton, body, self.dt, gravity)
-        )
-        self._data: mujoco.MjData = mj.MjData(self._model)
+        self._model = mj.MjModel.from_xml_string(mjcf.mjcf(skeleton, body, self.dt, gravity))
+        self._data = mj.MjData(self._model)
         self._range = self._model.jnt_range[1:, 1].copy()
         # MuJoCo sorts pairs its own way.
         part = {
@@ -237,10 +232,10 @@ class Ragdoll:
         turning = np.concatenate([np.zeros((len(q[0]), 1)), now.joint_velocity], axis=1)
         starts = (now.root_velocity, 0.5 * rotation.multiply(q[0], turning))
         at = np.arange(1, frames * self.steps + 1) / self.steps
-        smooth = [
-            CubicSpline(np.arange(frames + 1), knots, bc_type=((1, d / self.fps), (2, 0.0 * d)))(at)
-            for knots, d in zip((np.concatenate([now.root_position[None], roots]), q), starts)
-        ]
+        smooth = []
+        for knots, start in zip((np.concatenate([now.root_position[None], roots]), q), starts):
+            ends: Any = ((1, start / self.fps), (2, 0.0 * start))  # SciPy's stubs know names only
+            smooth.append(CubicSpline(np.arange(frames + 1), knots, bc_type=ends)(at))
         states = self._states(smooth[0], rotation.normalize(smooth[1]))
         start = self._states(now.root_position[None], now.wxyz[None])[0]
         speeds = np.empty((len(at) + 1, self._model.nv))
@@ -301,6 +296,16 @@ class Ragdoll:
                 found.append(j)
         return [j for j in found if j is not None]
 
+    def _inertia(self) -> np.ndarray:
+        """What hangs from each joint, about each of its axes [nv - 6], kg m²."""
+        unit, row = np.zeros(self._model.nv), np.empty(self._model.nv)
+        out = np.empty(self._model.nv)
+        for i in range(len(out)):
+            unit[i] = 1.0
+            self._mj.mj_mulM(self._model, self._data, row, unit)
+            out[i], unit[i] = row[i], 0.0
+        return out[6:]
+
     def _share(self, joint: int, point: np.ndarray, impulse: np.ndarray, striking: float) -> float:
         """How much (0..1) of an impulse the struck point takes before it flees as fast as the blow.
 
@@ -323,9 +328,7 @@ class Ragdoll:
         mj, m, d = self._mj, self._model, self._data
         states, speeds, accelerations = self._wanted(now, roots, turns)
         dt, nv, frames = self.dt, m.nv, len(roots)
-        mass = np.empty((nv, nv))
-        mj.mj_fullM(m, mass, d.qM) if hasattr(d, "qM") else mj.mj_fullM(m, d, mass)
-        inertia = np.diag(mass)[6:]
+        inertia = self._inertia()
         rate = np.repeat(self._rate[1:], 3)
         stiff = rate**2 * inertia
         damping = 2.0 * rate * inertia + dt * stiff
@@ -338,6 +341,8 @@ class Ragdoll:
         carried = [self._feet[f] for i, f in enumerate(self._pins) if held[i]]
         carrying = [mj.mj_name2id(m, mj.mjtObj.mjOBJ_BODY, f"j{j}") for j in carried]
         error, force = np.empty(nv), np.empty(nv)
+        warnings = mj.mjtWarning
+        bad = (warnings.mjWARN_BADQPOS, warnings.mjWARN_BADQVEL, warnings.mjWARN_BADQACC)
         out_root, out_wxyz = np.empty((frames, 3)), np.empty((frames, len(self.skeleton), 4))
         kinetic, slip = np.empty(frames), 0.0
         for s in range(frames * self.steps):
@@ -364,7 +369,8 @@ class Ragdoll:
             d.qfrc_applied[:] = force
             mj.mj_step2(m, d)
             fastest = float(np.abs(d.qvel).max())
-            if not fastest < FASTEST:
+            # Where MuJoCo itself has seen it, the state is the neutral pose again.
+            if not fastest < FASTEST or any(d.warning[w].number for w in bad):
                 raise _BlownUp(f"{fastest:.3g} m/s or rad/s after {(s + 1) * dt * 1000:.0f} ms")
             if (s + 1) % self.steps == 0:
                 t = (s + 1) // self.steps - 1
