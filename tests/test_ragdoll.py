@@ -15,6 +15,7 @@ from kumite.clip import ClipSet, Skeleton, concatenate, facing_frame, forward_ki
 from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.kernels import character as kernels
+from kumite.kernels import overlap
 from kumite.synthesis import Cast, Moment, Ragdoll, Responses, blow_impulse, find_responses
 from kumite.synthesis.ragdoll import EFFECTIVE_MASS, LIMP
 from kumite.synthesis.recoil import recoiling
@@ -46,7 +47,8 @@ def struck(clips: ClipSet, ragdoll: Ragdoll, f: int, impulse, part="head", **mor
 
 def standing(clips: ClipSet, count: int) -> list[int]:
     """Frames from which both feet stay on the ground, spread over a set."""
-    ground: np.ndarray = find_contacts(clips).on_ground.all(axis=1)
+    feet = find_contacts(clips).on_ground
+    ground = feet[:, 0] & feet[:, 1]
     frames = round(SECONDS * clips.fps)
     clip = clips.clip_of_frame
     fits = [
@@ -531,6 +533,18 @@ def test_bodies_leave_each_other_by_the_shortest_way(clips, apart: float):
     for turn in np.arange(2 * DIRECTIONS) * np.pi / DIRECTIONS if longest > 0 else ():
         way = longest * np.array([np.cos(turn), 0.0, np.sin(turn)])
         assert brute_depth(a, b, way, 25) > NEAR
+
+
+@pytest.mark.jit_off
+def test_the_deepest_overlap_is_that_of_the_deepest_frame():
+    rng = np.random.default_rng(2)
+    start, end = rng.normal(0, 0.2, (2, 5, 4, 3))
+    radius = rng.uniform(0.05, 0.2, 4)
+    first, second = np.array([0, 1, 0]), np.array([2, 3, 3])
+    each, found = np.empty((5, 3)), np.empty(3)
+    overlap.overlaps(start, end, radius, radius, first, second, each)
+    overlap.deepest_overlaps(start, end, radius, first, second, found)
+    assert np.allclose(found, each.max(axis=0), atol=1e-12)
 
 
 def test_spheres_leave_each_other_by_what_they_are_deep():

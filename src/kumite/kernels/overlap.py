@@ -44,6 +44,20 @@ def overlaps(start, end, radius_start, radius_end, first, second, out):
 
 
 @kernel
+def deepest_overlaps(start, end, radius, first, second, out):
+    """The most [P] of :func:`overlaps` over few frames, of capsules of one radius [B] each."""
+    p = np.empty(3)
+    for k in range(len(first)):
+        i, j = first[k], second[k]
+        a, b = radius[i], radius[j]
+        out[k] = 0.0
+        for f in range(len(start)):
+            a0, a1, b0, b1 = start[f, i], end[f, i], start[f, j], end[f, j]
+            one = depth(a0, a1, a, a, b0, b1, b, b, p)
+            out[k] = max(out[k], max(one, depth(b0, b1, b, b, a0, a1, a, a, p)))
+
+
+@kernel
 def sphere_depth(t, a0, a1, ra0, ra1, b0, b1, rb0, rb1, p):
     """How deep the sphere at t (0..1) along one part is in another; p is scratch [3]."""
     for c in range(3):

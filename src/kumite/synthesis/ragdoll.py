@@ -29,7 +29,7 @@ from kumite import rotation
 from kumite.body import Body
 from kumite.clip import SIDES, Skeleton, forward_kinematics, freeze
 from kumite.errors import KumiteError
-from kumite.kernels.overlap import overlaps
+from kumite.kernels.overlap import deepest_overlaps
 from kumite.synthesis import mjcf
 from kumite.synthesis.moment import Moment
 from kumite.synthesis.recoil import recoiling
@@ -260,7 +260,6 @@ class Ragdoll:
         d.qvel[:3] = now.root_velocity
         d.qvel[3:] = now.joint_velocity.ravel()
         m.dof_damping[:] = 0.0
-        mj.mj_forward(m, d)
         position, world = forward_kinematics(self.skeleton, all_roots, all_turns)
         self._stood = [position[0, self._feet[f]].copy() for f in self._pins]
         for i, f in enumerate(self._pins):
@@ -268,6 +267,7 @@ class Ragdoll:
             d.mocap_quat[i] = world[0, self._feet[f]]
             d.eq_active[i] = held[i]
         m.pair_margin[:] = -self._depths(position, world, held)
+        mj.mj_forward(m, d)  # last: the solver starts from what it finds here
 
     def _depths(self, position: np.ndarray, world: np.ndarray, held: np.ndarray) -> np.ndarray:
         """How deep [pairs] the motion itself puts parts into the ground and into each other [m]."""
@@ -283,10 +283,10 @@ class Ragdoll:
                 ground[np.isin(body.joint, self._below(self._feet[f]))] = 1.0
         first, second = self._pairs
         among = (first != GROUND) & (second != GROUND)
-        found = np.zeros((len(start), int(among.sum())))
-        overlaps(start, end, self._radius, self._radius, first[among], second[among], found)
+        found = np.empty(int(among.sum()))
+        deepest_overlaps(start, end, self._radius, first[among], second[among], found)
         out = ground[np.maximum(first, second)]
-        out[among] = found.max(axis=0, initial=0.0)
+        out[among] = found
         return out
 
     def _below(self, joint: int | None) -> list[int]:
@@ -340,7 +340,8 @@ class Ragdoll:
         in_joint = rotation.rotate(rotation.conjugate(d.xquat[struck]), point - d.xpos[struck])
         carried = [self._feet[f] for i, f in enumerate(self._pins) if held[i]]
         carrying = [mj.mj_name2id(m, mj.mjtObj.mjOBJ_BODY, f"j{j}") for j in carried]
-        error, force = np.empty(nv), np.empty(nv)
+        error, force, none = np.empty(nv), np.empty(nv), np.zeros(3)
+        turn, about, where = np.empty(3), np.empty(3), np.empty(3)
         warnings = mj.mjtWarning
         bad = (warnings.mjWARN_BADQPOS, warnings.mjWARN_BADQVEL, warnings.mjWARN_BADQACC)
         out_root, out_wxyz = np.empty((frames, 3)), np.empty((frames, len(self.skeleton), 4))
@@ -357,13 +358,15 @@ class Ragdoll:
                 # The feet carry what the root is short of: the same wrench, taken about each foot,
                 # acts on the ground; the root's own rows come to nothing.
                 pull = force[:3] / len(carrying)
-                turn = rotation.rotate(d.qpos[3:7], force[3:6]) / len(carrying)
+                mj.mju_rotVecQuat(turn, force[3:6], d.qpos[3:7])
                 for foot in carrying:
-                    about = turn - rotation.cross(d.xpos[foot] - d.qpos[:3], pull)
-                    mj.mj_applyFT(m, d, -pull, -about, d.xpos[foot], foot, force)
+                    mj.mju_cross(about, d.xpos[foot] - d.qpos[:3], pull)
+                    about -= turn / len(carrying)
+                    mj.mj_applyFT(m, d, -pull, about, d.xpos[foot], foot, force)
             if s < len(pulse):
-                where = d.xpos[struck] + rotation.rotate(d.xquat[struck], in_joint)
-                mj.mj_applyFT(m, d, impulse * pulse[s], np.zeros(3), where, struck, force)
+                mj.mju_rotVecQuat(where, in_joint, d.xquat[struck])
+                where += d.xpos[struck]
+                mj.mj_applyFT(m, d, impulse * pulse[s], none, where, struck, force)
             if not np.all(np.isfinite(force)):
                 raise _BlownUp(f"forces are not finite after {s * dt * 1000:.0f} ms")
             d.qfrc_applied[:] = force
