@@ -33,8 +33,10 @@ def test_examples_run(example: str, tmp_path: Path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("document", ["README.md", "docs/performer.md"])
+@pytest.mark.parametrize("document", ["README.md", "docs/performer.md", "docs/reactions.md"])
 def test_the_documents_python_runs(document: str, tmp_path: Path):
+    if document == "docs/reactions.md":
+        pytest.importorskip("mujoco")
     code = "\n".join(blocks("python", document))
     assert code
     done = subprocess.run(
