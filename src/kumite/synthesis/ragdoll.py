@@ -149,6 +149,12 @@ class Ragdoll:
         self._neutral = mjcf.neutral_pose(skeleton)
         self._model = mj.MjModel.from_xml_string(mjcf.mjcf(skeleton, body, self.dt, gravity))
         self._data = mj.MjData(self._model)
+        # MuJoCo goes down each limb before the next; a skeleton need not.
+        bodies = [
+            mj.mj_name2id(self._model, mj.mjtObj.mjOBJ_BODY, f"j{j}") for j in range(len(skeleton))
+        ]
+        self._order = np.argsort(bodies)  # [J] the skeleton's joint, of each of MuJoCo's
+        self._rate = self._rate[self._order]
         self._range = self._model.jnt_range[1:, 1].copy()
         # MuJoCo sorts pairs its own way.
         part = {
@@ -220,7 +226,7 @@ class Ragdoll:
     def _states(self, roots: np.ndarray, turns: np.ndarray) -> np.ndarray:
         """Poses as MuJoCo's qpos [N, nq]."""
         ball = rotation.multiply(rotation.conjugate(self._neutral), turns)
-        return np.concatenate([roots, ball.reshape(len(roots), -1)], axis=1)
+        return np.concatenate([roots, ball[:, self._order].reshape(len(roots), -1)], axis=1)
 
     def _wanted(self, now: Moment, roots: np.ndarray, turns: np.ndarray) -> tuple[np.ndarray, ...]:
         """Target states [S, nq], speeds [S, nv] and accelerations [S, nv] at every physics step.
@@ -239,7 +245,7 @@ class Ragdoll:
         states = self._states(smooth[0], rotation.normalize(smooth[1]))
         start = self._states(now.root_position[None], now.wxyz[None])[0]
         speeds = np.empty((len(at) + 1, self._model.nv))
-        speeds[0] = np.concatenate([now.root_velocity, now.joint_velocity.ravel()])
+        speeds[0] = np.concatenate([now.root_velocity, now.joint_velocity[self._order].ravel()])
         for s in range(len(at)):
             before = states[s - 1] if s else start
             self._mj.mj_differentiatePos(self._model, speeds[s + 1], self.dt, before, states[s])
@@ -258,7 +264,7 @@ class Ragdoll:
         m.jnt_range[1:, 1] = np.maximum(self._range, angles.max(axis=0, initial=0.0) + 0.05)
         d.qpos[:] = states[0]
         d.qvel[:3] = now.root_velocity
-        d.qvel[3:] = now.joint_velocity.ravel()
+        d.qvel[3:] = now.joint_velocity[self._order].ravel()
         m.dof_damping[:] = 0.0
         position, world = forward_kinematics(self.skeleton, all_roots, all_turns)
         self._stood = [position[0, self._feet[f]].copy() for f in self._pins]
@@ -379,9 +385,10 @@ class Ragdoll:
                 t = (s + 1) // self.steps - 1
                 out_root[t] = d.qpos[:3]
                 ball = rotation.normalize(d.qpos[3:].reshape(-1, 4))
-                out_wxyz[t] = rotation.multiply(self._neutral, ball)
+                out_wxyz[t, self._order] = ball
                 mj.mj_mulM(m, d, force, d.qvel)
                 kinetic[t] = 0.5 * float(d.qvel @ force)
+        out_wxyz = rotation.multiply(self._neutral, out_wxyz)
         position, _ = forward_kinematics(self.skeleton, out_root, out_wxyz)
         meant, _ = forward_kinematics(self.skeleton, roots, turns)
         for i, f in enumerate(self._pins):
@@ -389,7 +396,9 @@ class Ragdoll:
                 moved = position[:, self._feet[f]] - self._stood[i]
                 slip = max(slip, float(np.linalg.norm(moved, axis=1).max()))
         deviation = np.linalg.norm(position - meant, axis=-1).mean(axis=-1)
-        end = Moment(out_root[-1], out_wxyz[-1], d.qvel[:3], d.qvel[3:].reshape(-1, 3))
+        turning = np.empty((len(self.skeleton), 3))
+        turning[self._order] = d.qvel[3:].reshape(-1, 3)
+        end = Moment(out_root[-1], out_wxyz[-1], d.qvel[:3], turning)
         return Pushed(out_root, out_wxyz, deviation, kinetic, end, impulse, slip, True)
 
     def _given_way(self, now, roots, turns, joint, point, impulse, why: str) -> Pushed:
