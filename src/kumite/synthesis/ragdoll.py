@@ -43,6 +43,8 @@ GROUND = -1  # in the place of a part, of a pair that may collide
 STEP = 0.002  # s, at most, of physics
 FASTEST = 300.0  # m/s or rad/s at which a simulation has blown up; the hardest blows give half
 HARDEST = 400.0  # m/s² or rad/s² that inverse dynamics follows: what is more is a jump, not motion
+STRONGEST = 30.0  # m/s² likewise of the root: three times the weight is what legs give in a jump
+SWIFTEST = 60.0  # rad/s likewise: capture turns a wrist over between two frames of 120 Hz
 RECOIL = 0.018 / EFFECTIVE_MASS["hand"]  # m per N s that a struck segment gives without physics
 
 
@@ -249,7 +251,9 @@ class Ragdoll:
         for s in range(len(at)):
             before = states[s - 1] if s else start
             self._mj.mj_differentiatePos(self._model, speeds[s + 1], self.dt, before, states[s])
+        np.clip(speeds[:, 3:], -SWIFTEST, SWIFTEST, out=speeds[:, 3:])
         accelerations = np.clip(np.diff(speeds, axis=0) / self.dt, -HARDEST, HARDEST)
+        np.clip(accelerations[:, :3], -STRONGEST, STRONGEST, out=accelerations[:, :3])
         return states, speeds[1:], accelerations
 
     def _set_up(self, now: Moment, roots: np.ndarray, turns: np.ndarray, held: np.ndarray) -> None:
@@ -264,7 +268,7 @@ class Ragdoll:
         m.jnt_range[1:, 1] = np.maximum(self._range, angles.max(axis=0, initial=0.0) + 0.05)
         d.qpos[:] = states[0]
         d.qvel[:3] = now.root_velocity
-        d.qvel[3:] = now.joint_velocity[self._order].ravel()
+        d.qvel[3:] = np.clip(now.joint_velocity[self._order].ravel(), -SWIFTEST, SWIFTEST)
         m.dof_damping[:] = 0.0
         position, world = forward_kinematics(self.skeleton, all_roots, all_turns)
         self._stood = [position[0, self._feet[f]].copy() for f in self._pins]
