@@ -14,7 +14,8 @@ from kumite.kernels import character as kernels
 from kumite.kernels import pose
 from kumite.scene.live import RECOIL
 from kumite.synthesis import Cast
-from kumite.synthesis.cast import MOST_GIVEN, _below
+from kumite.synthesis.cast import _below
+from kumite.synthesis.recoil import MOST_GIVEN
 from tests import toys
 
 FRONT = np.array([0.0, 0.0, 1.0])

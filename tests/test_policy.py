@@ -447,7 +447,7 @@ def test_striking_counts_only_while_the_target_is_in_reach(library: Library):
     worths = []
     for said in (behaviour, everywhere):
         skill = Skill(library, near, solve(library, said), tracks)
-        mind = Fighters(skill, [Temper(0.0, 6.0, facing=0.0)], 0)
+        mind = Fighters(skill, [Temper(0.0, 6.0, facing=0.0, again=1)], 0)
         worths.append([])
         for state in range(0, library.table.states, 5):
             for away in (0.7, behaviour.farthest - 0.01, behaviour.farthest + 0.01, 3.0):

@@ -133,8 +133,8 @@ def test_a_blow_spends_itself_on_what_it_meets_first():
     assert _first_struck() == GLOVE
     # Two fists on their way do not meet, but a forearm is struck though its fist is on its way.
     assert _first_struck(throws=True) == FOREARM
-    # Met at 30° from square: blocked. At 53°, or not at all: it goes on to the head.
-    assert _first_struck(0.06) == GLOVE
+    # Met at 25° from square: blocked. At 53°, or not at all: it goes on to the head.
+    assert _first_struck(0.05) == GLOVE
     assert _first_struck(0.096) == HEAD
     assert _first_struck(0.5) == HEAD
 

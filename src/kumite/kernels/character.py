@@ -17,7 +17,7 @@ import numpy as np
 from numba import prange
 
 from kumite.kernels.jit import kernel, parallel_kernel
-from kumite.kernels.pose import quaternion_product
+from kumite.kernels.pose import add_rotated, quaternion_product
 
 TINY = 1e-12
 LN2 = 0.6931471805599453

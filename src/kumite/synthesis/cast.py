@@ -134,7 +134,7 @@ class Cast:
             np.concatenate([now.root_velocity[None], now.joint_velocity]),
             position[feet],
             velocity[feet],
-            self._capture,
+            self.played.capture,
             self._offsets,
         )
 
