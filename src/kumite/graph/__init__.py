@@ -5,12 +5,14 @@ from kumite.graph.distance import PoseFeatures, pose_features
 from kumite.graph.library import Library, build_library, load_library, save_library
 from kumite.graph.table import ActionTable, fold
 from kumite.graph.transitions import Transitions, find_transitions, strongest_component
+from kumite.graph.whole import build_action_library
 
 __all__ = [
     "ActionTable",
     "Library",
     "PoseFeatures",
     "Transitions",
+    "build_action_library",
     "build_library",
     "builtin_library",
     "find_transitions",

@@ -8,25 +8,42 @@ from pathlib import Path
 
 from kumite import performer
 from kumite.clip import Clip, concatenate
-from kumite.errors import KumiteError
+from kumite.errors import KumiteError, unknown
 from kumite.files import code_digest
 from kumite.graph.library import Library, build_library, load_library, save_library
+from kumite.graph.whole import build_action_library
 
 FPS = 60.0
 
 
+LEVELS = ("frames", "actions")
+
+
 def builtin_library(
-    cache: Path | None, progress: Callable[[str], None] = lambda stage: None
+    cache: Path | None,
+    progress: Callable[[str], None] = lambda stage: None,
+    *,
+    style: str = "boxing",
+    level: str = "frames",
 ) -> Library:
-    """The built-in performer's motion graph, kept in ``cache`` under the code that makes it."""
+    """The built-in performer's motion graph, kept in ``cache`` under the code that makes it.
+
+    level: a graph of ``frames`` (:func:`build_library`), without reactions, or of whole ``actions``
+    (:func:`build_action_library`), with them. Errors: an unknown style or level.
+    """
+    if level not in LEVELS:
+        raise unknown("level", level, LEVELS)
     key = code_digest("performer", "body", "annotate", "graph", "clip", "rotation", "kernels")
-    path = None if cache is None else cache / f"performer-{key}.kumite"
+    path = None if cache is None else cache / f"performer-{style}-{level}-{key}.kumite"
     if path is not None and path.exists():
         with contextlib.suppress(KumiteError):  # damaged or of another version: made anew
             return load_library(path)
     progress("performing")
-    clips = concatenate(_voluntary(performer.performed(mirrored=False, cache=cache)), FPS)
-    library = build_library(clips, progress=progress)
+    made = performer.performed(style, mirrored=False, cache=cache)
+    if level == "frames":
+        library = build_library(concatenate(_voluntary(made), FPS), progress=progress)
+    else:
+        library = build_action_library(concatenate(list(made.clips), FPS), progress=progress)
     if path is not None:
         with contextlib.suppress(KumiteError):  # a cache that cannot be written only costs time
             save_library(path, library)

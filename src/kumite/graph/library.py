@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from kumite import files
-from kumite.annotate import Contacts, Strikes, find_contacts, find_strikes
+from kumite.annotate import Actions, Contacts, Strikes, find_contacts, find_strikes
 from kumite.clip import ClipSet, Skeleton
 from kumite.errors import KumiteError
 from kumite.graph.distance import pose_features
@@ -25,7 +25,7 @@ from kumite.graph.transitions import (
 )
 
 KIND = "library"
-VERSION = 2
+VERSION = 3
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,7 @@ class Library:
     strikes: Strikes
     table: ActionTable
     report: dict[str, Any] = field(default_factory=dict)  # how it was built, JSON values
+    actions: Actions | None = None  # what the stretches of an action-level graph are
 
     def __post_init__(self) -> None:
         frames = len(self.clips)
@@ -50,6 +51,21 @@ class Library:
         clip = self.clips.clip_of_frame
         if np.any(last >= frames) or np.any(clip[first] != clip[last]):
             raise KumiteError("library: an action leaves its clip")
+        if self.actions is not None:
+            if not np.array_equal(self.actions.clip_start, self.clips.clip_start):
+                raise KumiteError("library: its actions are of other clips")
+            if np.any(self.actions.stop[self.action_of_stretch] - 1 != last):
+                raise KumiteError("library: a stretch is not an action")
+
+    @property
+    def action_of_stretch(self) -> np.ndarray:
+        """The action [L] that each stretch of an action-level graph plays. Errors: it is none."""
+        if self.actions is None:
+            raise KumiteError(
+                "the library's graph is one of frames; expected one of whole actions "
+                "(kumite build --level actions)"
+            )
+        return np.searchsorted(self.actions.start, self.table.first, side="right") - 1
 
     @cached_property
     def digest(self) -> str:
@@ -127,7 +143,14 @@ def _arrays(library: Library) -> dict[str, np.ndarray]:
         **_group("contacts", library.contacts),
         **_group("strikes", library.strikes),
         **_group("table", library.table),
+        **({} if library.actions is None else _action_arrays(library.actions)),
     }
+
+
+def _action_arrays(actions: Actions) -> dict[str, np.ndarray]:
+    group = _group("actions", actions)
+    del group["actions.label"], group["actions.clip_start"]  # a header's, and the clips'
+    return group
 
 
 def save_library(path: Path | str, library: Library) -> None:
@@ -137,6 +160,7 @@ def save_library(path: Path | str, library: Library) -> None:
         "joint_names": list(library.clips.skeleton.names),
         "roles": dict(library.clips.skeleton.roles),
         "report": library.report,
+        "labels": None if library.actions is None else list(library.actions.label),
     }
     files.save(path, KIND, VERSION, header, _arrays(library))
 
@@ -165,6 +189,11 @@ def load_library(path: Path | str) -> Library:
             Strikes(**part("strikes")),
             ActionTable(**part("table")),
             header["report"],
+            None
+            if header["labels"] is None
+            else Actions(
+                label=tuple(header["labels"]), clip_start=clips.clip_start, **part("actions")
+            ),
         )
     except (KeyError, TypeError, ValueError, KumiteError) as error:
         raise KumiteError(f"{path}: damaged library ({error})") from None

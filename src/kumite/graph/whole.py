@@ -1,0 +1,158 @@
+"""The action-level motion graph (Shum et al. 2012, section IV): edges are whole actions.
+
+Nodes are postures: the poses in which actions start and end, clustered by likeness. The result is
+the same action table as that of the frame-level graph, so every controller plans on it: a state is
+the last frame of an action, its actions are all those that start in the cluster it ends in.
+Reactions are stretches of the table that no state offers: nobody chooses to be struck.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.cluster.hierarchy import fcluster, linkage
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial.distance import squareform
+
+from kumite.annotate import KINDS, Actions, find_actions, find_contacts, find_strikes
+from kumite.clip import ClipSet
+from kumite.errors import KumiteError
+from kumite.graph.distance import pose_features
+from kumite.graph.library import Library
+from kumite.graph.table import ActionTable
+from kumite.kernels import distance as kernels
+from kumite.rotation import planar_compose, planar_inverse
+
+ALIKE = 1.2  # rad: poses of one cluster are nearer than that, on average (root of D)
+_SPARE = 8  # rows that the kernel may write beyond the last
+
+
+def build_action_library(
+    clips: ClipSet,
+    actions: Actions | None = None,
+    *,
+    alike: float = ALIKE,
+    progress: Callable[[str], None] = lambda stage: None,
+) -> Library:
+    """Notes and the action-level graph of a set of clips.
+
+    actions: of these clips, by default as the motion analyser finds them. alike: how far [rad]
+    poses of one node may be apart. Errors: no connected part with two actions that can be chosen.
+    """
+    if not 0 < alike < np.inf:
+        raise KumiteError(f"alike {alike}; expected more than 0 rad")
+    progress("finding contacts and effective hits")
+    contacts, strikes = find_contacts(clips), find_strikes(clips)
+    if actions is None:
+        progress("finding actions")
+        actions = find_actions(clips, contacts, strikes)
+    elif not np.array_equal(actions.clip_start, clips.clip_start):
+        raise KumiteError("actions: of other clips")
+    progress("clustering postures")
+    # An action is entered from the frame before it, where its clip has one: then what follows in
+    # the capture follows here without a join.
+    starts_clip = np.isin(actions.start, clips.clip_start)
+    enter = np.where(starts_clip, actions.start, actions.start - 1)
+    last = actions.stop - 1
+    keep = last > enter
+    start_node, end_node, nodes = _postures(clips, enter, last, alike)
+    chosen = actions.kind != KINDS.index("reaction")
+    keep = _connected(start_node, end_node, nodes, keep, chosen)
+    usable = keep & chosen
+    if usable.sum() < 2:
+        raise KumiteError(
+            f"too few actions for a graph: of {len(actions)} found, {int(usable.sum())} are "
+            "connected and can be chosen; expected at least 2 (more clips, or a larger --alike)"
+        )
+    order = np.flatnonzero(keep)
+    state_frame = last[order]  # ascending: actions are in order and do not overlap
+    offered = [np.flatnonzero(usable[order] & (start_node[order] == n)) for n in end_node[order]]
+    counts = np.array([len(o) for o in offered])
+    stretch = np.concatenate(offered)
+    cost = _join_costs(clips, np.repeat(state_frame, counts), enter[order][stretch])
+    facing = clips.facing
+    first = enter[order] + 1
+    table = ActionTable(
+        state_frame.astype(np.int32),
+        np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
+        stretch.astype(np.int32),
+        cost,
+        first.astype(np.int32),
+        state_frame.astype(np.int32),
+        np.arange(len(order), dtype=np.int32),
+        planar_compose(planar_inverse(facing[first - 1]), facing[state_frame]),
+    )
+    report = {
+        "level": "actions",
+        "alike": alike,
+        "fps": clips.fps,
+        "frames": len(clips),
+        "frames_kept": int(table.duration.sum()),
+        "actions_found": len(actions),
+        "nodes": len(np.unique(end_node[order])),
+        "states": table.states,
+        "actions": table.actions,
+        "stretches": len(first),
+        "mean_ways_out": float(counts.mean()),
+        "mean_action_s": float(table.duration.mean() / clips.fps),
+        "mean_join_cost": float(cost[cost > 0].mean()) if np.any(cost > 0) else 0.0,
+        "hits": len(strikes),
+        **{f"{kind}s": int(np.sum(keep & (actions.kind == k))) for k, kind in enumerate(KINDS)},
+    }
+    return Library(clips, contacts, strikes, table, report, actions)
+
+
+def _distances(clips: ClipSet, frames: np.ndarray) -> np.ndarray:
+    """Root of D [n, n] rad between poses."""
+    features, count = pose_features(clips).take(frames), len(frames)
+    rows = np.empty((count + _SPARE, count), dtype=np.float32)
+    kernels.distance_rows(features.quaternion, features.weight, features.euclidean, 0, count, rows)
+    square = rows[:count]
+    out = np.sqrt(np.maximum(0.5 * (square + square.T), 0.0))
+    np.fill_diagonal(out, 0.0)
+    return out
+
+
+def _postures(
+    clips: ClipSet, enter: np.ndarray, last: np.ndarray, alike: float
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """The nodes that actions start [A] and end [A] in, and how many there are."""
+    frames = np.unique(np.concatenate([enter, last]))
+    if len(frames) < 2:
+        raise KumiteError("too few actions for a graph: expected at least 2")
+    condensed = squareform(_distances(clips, frames), checks=False)
+    node = fcluster(linkage(condensed, "average"), alike, "distance") - 1
+    return (
+        node[np.searchsorted(frames, enter)],
+        node[np.searchsorted(frames, last)],
+        int(node.max()) + 1,
+    )
+
+
+def _connected(
+    start: np.ndarray, end: np.ndarray, nodes: int, keep: np.ndarray, chosen: np.ndarray
+) -> np.ndarray:
+    """The actions [A] of the largest part in which each leads to each, by choice or by a blow."""
+    while True:
+        edges = coo_array((np.ones(keep.sum()), (start[keep], end[keep])), shape=(nodes, nodes))
+        _, part = connected_components(edges.tocsr(), directed=True, connection="strong")
+        inside = keep & (part[start] == part[end])
+        if not inside.any():
+            return inside
+        largest = np.argmax(np.bincount(part[start[inside]]))
+        inside &= part[start] == largest
+        # A posture in which nothing can be chosen would be a dead end.
+        ways = np.bincount(start[inside & chosen], minlength=nodes)
+        left = inside & (ways[end] > 0)
+        if np.array_equal(left, keep):
+            return keep
+        keep = left
+
+
+def _join_costs(clips: ClipSet, source: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Root of D [n] float32 between the frames that are joined; 0 where the capture goes on."""
+    frames, index = np.unique(np.concatenate([source, target]), return_inverse=True)
+    distance = _distances(clips, frames)
+    return distance[index[: len(source)], index[len(source) :]].astype(np.float32)
