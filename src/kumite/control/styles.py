@@ -1,0 +1,136 @@
+"""Styles: the weights by which a fighter directed by a game tree judges what happens (B6, B8).
+
+    F_comp = −w_θ(θ − θ_d)² − w_r(r − r_d)²  +  w_D⁺ D⁺ − w_D⁻ D⁻  +  w_S S        (Eqs. 4, 5, 7, 8)
+    F_coop = −w_γ(γ − γ_d)² − w_p‖p − p_d‖²  +  (±w_a or 0)                        (Eqs. 9 to 11)
+
+(Shum et al. 2012, section VI.) Both movement terms are costs: the print omits the minus signs, but
+says that a distance near the preferred one scores high. Angles are in radians, distances in metres.
+
+    D = ‖v_attack‖ / v' · vulnerability                                                      (Eq. 6)
+
+with v' = :data:`UNIT_SPEED` and the vulnerability of the part that is hit. S comes from
+:mod:`kumite.control.combination`, p_d and the actions wanted from :mod:`kumite.control.routes`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+
+import numpy as np
+
+from kumite.annotate import DIRECTIONS, KINDS, Actions
+from kumite.errors import KumiteError, unknown
+from kumite.kernels import style as columns
+
+UNIT_SPEED = 1.0  # v', m/s (the paper's 100, of centimetres a second)
+VULNERABILITY = {"head": 2.0, "torso": 1.0, "limbs": 0.0}  # w_being_attack
+SHORT_RANGE = ("hook", "uppercut")
+"""Ways of an attack that are short-range. Straights, kicks, slashes and thrusts are long-range."""
+
+
+@dataclass(frozen=True)
+class Style:
+    """How much a fighter minds what. All of it may be changed between decisions (B12)."""
+
+    facing: float = 10.0  # w_θ, of the angle [rad] between where it looks and the opponent
+    distance: float = 10.0  # w_r, of the distance [m] to the opponent
+    preferred_facing: float = 0.0  # θ_d, rad: 0 looks at the opponent
+    preferred_distance: float = 0.8  # r_d, m
+    given_short: float = 1e5  # w_D⁺, of damage given by short-range attacks
+    given_long: float = 1e5  # w_D⁺, by the others
+    taken: float = 1e5  # w_D⁻, of damage received
+    suitability: float = 1e2  # w_S, of the action combination table
+    heading: float = 0.0  # w_γ, of the way it faces in the world [rad]
+    place: float = 0.0  # w_p, of the distance [m] to the next check point
+    requirement: float = 0.0  # w_a, of actions that are wanted, or unwanted, there
+    preferred_heading: float | None = None  # γ_d, rad; None: none
+
+    def __post_init__(self) -> None:
+        wrong = []
+        for name, value in asdict(self).items():
+            if value is None and name == "preferred_heading":
+                continue
+            if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+                wrong.append(f"{name}: {value!r}; expected a number")
+                continue
+            object.__setattr__(self, name, float(value))
+            if not np.isfinite(value):
+                wrong.append(f"{name}: {float(value)}; expected a finite number")
+            elif value < 0 and name not in ANGLES:
+                wrong.append(f"{name}: {float(value):g}; expected 0 or more")
+        if not wrong and self.heading > 0 and self.preferred_heading is None:
+            wrong.append(f"heading: {self.heading:g}; expected a preferred_heading with it")
+        if wrong:
+            raise KumiteError("\n".join(f"style: {what}" for what in wrong))
+
+    def changed(self, **weights: float | None) -> Style:
+        """The style with some weights changed. Errors: unknown names, with near ones; values that
+        are not finite, or below 0.
+        """
+        for name in weights:
+            if name not in NAMES:
+                raise unknown("weight of a style", name, NAMES)
+        return replace(self, **weights)
+
+    def as_array(self) -> np.ndarray:
+        """The weights [COLUMNS] float64, in the columns of :mod:`kumite.kernels.style`."""
+        out = np.zeros(columns.COLUMNS)
+        for name, value in asdict(self).items():
+            out[getattr(columns, name.upper())] = 0.0 if value is None else value
+        return out
+
+    def given(self, actions: Actions) -> np.ndarray:
+        """w_D⁺ [A] of the damage that each action gives; 0 for those that are no attacks."""
+        attack = actions.kind == KINDS.index("attack")
+        weight = np.where(short_range(actions), self.given_short, self.given_long)
+        return np.where(attack, weight, 0.0)
+
+
+NAMES = tuple(f.name for f in fields(Style))
+ANGLES = ("preferred_facing", "preferred_heading")
+
+
+def short_range(actions: Actions) -> np.ndarray:
+    """Which actions [A] bool are short-range attacks: hooks and uppercuts (the † of Table III).
+
+    Of an action of several blows the first decides, as it does its direction.
+    """
+    return np.isin(actions.direction, [DIRECTIONS.index(way) for way in SHORT_RANGE])
+
+
+_BOXER = Style()
+_SWORD = _BOXER.changed(preferred_distance=1.5)
+_CHASER = _BOXER.changed(preferred_distance=0.1, taken=0.0, suitability=0.0)
+_RUNAWAY = _BOXER.changed(preferred_distance=3.0, given_short=0.0, given_long=0.0, suitability=0.0)
+
+STYLES: dict[str, Style] = {
+    "boxer": _BOXER,
+    "infighter": _BOXER.changed(preferred_distance=0.5, given_long=10.0),
+    "outboxer": _BOXER.changed(preferred_distance=2.0, given_short=10.0),
+    "boxer_path": _BOXER.changed(place=10.0, requirement=1e6),
+    "sword_fighter": _SWORD,
+    "sword_fighter_path": _SWORD.changed(place=10.0, requirement=1e6),
+    "chaser": _CHASER,
+    "runaway": _RUNAWAY,
+    "chaser_path": _CHASER.changed(place=10.0),
+    "runaway_path": _RUNAWAY.changed(place=10.0),
+}
+"""The paper's, Tables III and IV."""
+
+
+def style(wanted: str | Mapping[str, object] | Style) -> Style:
+    """A style by the name of a preset, or by a mapping of weights to change.
+
+    A mapping's ``preset`` names the style that is changed; without it, that is "boxer". Errors:
+    unknown presets and weights, with near names; values that are no weights.
+    """
+    if isinstance(wanted, Style):
+        return wanted
+    if isinstance(wanted, str):
+        wanted = {"preset": wanted}
+    weights = dict(wanted)
+    preset = weights.pop("preset", "boxer")
+    if not isinstance(preset, str) or preset not in STYLES:
+        raise unknown("style", str(preset), STYLES)
+    return STYLES[preset].changed(**weights)  # type: ignore[arg-type]  # checked in there
