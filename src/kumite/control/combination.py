@@ -11,8 +11,8 @@ that are not a defence against an attack have 0, until a person says otherwise.
 **Attacks.** Positions: the bands of a standing body that the effective hitting points pass where
 the limb is nearly as far out as it gets; a combination has those of all its blows. Directions:
 straights and thrusts come from the front, hooks horizontally, uppercuts upwards; kicks and slashes
-the way the tip goes when it is fastest, against the line from the chest to the tip. (The facing
-frame would not do: a boxer's hips are turned from the opponent by a quarter circle.)
+the way the tip goes meanwhile, against the line from the chest to the tip. (The facing frame would
+not do: a boxer's hips may be turned from the opponent by a quarter circle.)
 
 **Defences.** Directions and what may be protected are known of each way; what is, is measured:
 
@@ -137,7 +137,7 @@ class _Body:
     pelvis: np.ndarray  # [F, 3]
     elbow: np.ndarray  # [F, 2, 3], left and right
     tip: np.ndarray  # [F, 4, 3], of the limbs
-    speed: np.ndarray  # [F, 4, 3] m/s of the tips
+    velocity: np.ndarray  # [F, 4, 3] m/s of the tips
     borders: np.ndarray  # [2] m: below the first is the lower torso, above the second the head
 
     @staticmethod
@@ -148,12 +148,12 @@ class _Body:
         head, chest, pelvis = (position[:, skeleton.joint(role)] for role in roles)
         elbow = position[:, [skeleton.joint(f"{side}_forearm") for side in ("left", "right")]]
         tip = np.stack([tip_positions(skeleton, limb, position, world) for limb in LIMBS], axis=1)
-        speed = np.stack([velocity(tip[:, k], clips) for k in range(len(LIMBS))], axis=1)
+        moving = np.stack([velocity(tip[:, k], clips) for k in range(len(LIMBS))], axis=1)
         # Most frames of a fighter are near the guard. The chest's joint does not tell where the
         # lower torso ends: skeletons have it anywhere from the waist to the shoulder blades.
         top, bottom = np.median(head[:, 1]), np.median(pelvis[:, 1])
         borders = np.array([0.5 * (top + bottom), top - CHIN * (top - bottom)])
-        return _Body(head, chest, pelvis, elbow, tip, speed, borders)
+        return _Body(head, chest, pelvis, elbow, tip, moving, borders)
 
     def bands(self, low: float, high: float) -> np.ndarray:
         """Which of POSITIONS [3] bool lie between two heights [m]. Legs count as lower torso."""
@@ -182,18 +182,23 @@ def _blows(
             )
             for i in found
         ]
-    speed = np.linalg.norm(body.speed[start:stop], axis=2)
+    speed = np.linalg.norm(body.velocity[start:stop], axis=2)
     limb = int(actions.limb[k])
     if limb == NO_LIMB:
         limb = int(speed.max(axis=0).argmax())
     return [(limb, start + np.flatnonzero(speed[:, limb] >= FAST * speed[:, limb].max()), own)]
 
 
+def _out(body: _Body, limb: int, frames: np.ndarray) -> np.ndarray:
+    """Those frames of a blow in which it is nearly as far out as it gets."""
+    away = (body.tip[frames, limb] - body.pelvis[frames])[:, [0, 2]]
+    reach = np.linalg.norm(away, axis=1)
+    return frames[reach >= OUT * reach.max()]
+
+
 def _hit(body: _Body, limb: int, frames: np.ndarray) -> np.ndarray:
     """What a blow hits [3] bool."""
-    tip = body.tip[frames, limb]
-    reach = np.linalg.norm((tip - body.pelvis[frames])[:, [0, 2]], axis=1)
-    height = tip[reach >= OUT * reach.max(), 1]
+    height = body.tip[_out(body, limb, frames), limb, 1]
     return body.bands(height.min() - MARGIN, height.max() + MARGIN)
 
 
@@ -201,12 +206,12 @@ def _from(body: _Body, limb: int, frames: np.ndarray, way: str) -> int:
     """Which of HIT_DIRECTIONS a blow comes from."""
     if way in _DIRECTION_OF:
         return _DIRECTION_OF[way]
-    speed = np.linalg.norm(body.speed[frames, limb], axis=1)
-    peak = frames[int(speed.argmax())]
-    v = body.speed[peak, limb] / max(float(speed.max()), 1e-9)
+    out = _out(body, limb, frames)
+    v = body.velocity[out, limb].mean(axis=0)
+    v /= max(float(np.linalg.norm(v)), 1e-9)
     if v[1] > UPWARD:
         return UPWARDS
-    outward = (body.tip[peak, limb] - body.chest[peak])[[0, 2]]
+    outward = (body.tip[out, limb] - body.chest[out]).mean(axis=0)[[0, 2]]
     along = v[[0, 2]] @ outward / max(float(np.linalg.norm(outward)), 1e-9)
     level = float(np.linalg.norm(v[[0, 2]]))
     # A slash straight down has little that is level: it comes from the front.
@@ -349,16 +354,19 @@ class CombinationTable:
         return out
 
     def with_entry(self, entry: Entry) -> CombinationTable:
-        """The table with an entry of a person's. Errors: an action it does not have."""
+        """The table with an entry of a person's. Errors: an action it does not have.
+
+        One for a label leaves alone those of its actions that have an entry of their own.
+        """
         others = [e for e in self.entries if (e.kind, e.action) != (entry.kind, entry.action)]
-        return replace(self, entries=self._ordered([*others, replace(entry, by_hand=True)]))
+        return replace(self, entries=self.ordered([*others, replace(entry, by_hand=True)]))
 
     def with_pair(self, action: str, opponent: str, suitability: float) -> CombinationTable:
         """The table with a pair overridden. Errors: unknown actions; a value that is not finite."""
         others = [p for p in self.pairs if (p.action, p.opponent) != (action, opponent)]
         return replace(self, pairs=(*others, Pair(action, opponent, suitability)))
 
-    def _ordered(self, entries: Iterable[Entry]) -> tuple[Entry, ...]:
+    def ordered(self, entries: Iterable[Entry]) -> tuple[Entry, ...]:
         """Attacks before defences, labels as they first appear, single actions behind them."""
         first: dict[str, int] = {}
         for k, label in enumerate(self.labels):
@@ -400,7 +408,7 @@ def build_table(
                 for k, each in zip(which, said)
                 if each != most
             ]
-    return replace(bare, entries=bare._ordered(entries))
+    return replace(bare, entries=bare.ordered(entries))
 
 
 def _entry(kind: str, action: str, said: tuple[tuple[bool, ...], tuple[bool, ...]]) -> Entry:
