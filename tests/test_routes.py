@@ -49,7 +49,7 @@ def test_required_actions_are_performed_there():
 
 
 def test_refused_actions_are_unwanted_until_the_check_point_is_done():
-    progress = Progress(Route((CheckPoint((0, 0), refuse=["fall"]), CheckPoint((1, 0)))))
+    progress = Progress(Route((CheckPoint((0, 0), refuse=("fall",)), CheckPoint((1, 0)))))
     assert progress.unwanted == ("fall",)
     progress.update((0, 0), 0.0)
     assert progress.unwanted == ()
@@ -124,6 +124,10 @@ def test_what_is_no_route_is_refused():
 # Shapes ------------------------------------------------------------------------------------------
 
 
+def times(route: Route) -> list[float]:
+    return [p.time for p in route.points if p.time is not None]
+
+
 def test_a_line_is_even():
     route = line((1, 2), (4, 6), 6, seconds=10.0, begin=3.0, radius=0.2)
     assert route.length == pytest.approx(5.0)
@@ -159,7 +163,7 @@ def test_a_spiral_is_as_long_as_archimedes_says():
     assert away[[0, -1]] == pytest.approx([inner, outer])
     steps = np.linalg.norm(np.diff(route.places, axis=0), axis=1)
     assert steps == pytest.approx(np.full(2000, steps.mean()), rel=1e-3)  # one speed
-    assert np.diff([p.time for p in route.points]) == pytest.approx(np.full(2000, 0.03))
+    assert np.diff(times(route)) == pytest.approx(np.full(2000, 0.03))
 
 
 def test_routes_are_put_behind_one_another():
@@ -186,10 +190,10 @@ spirals = st.builds(
 
 @given(spirals)
 @settings(max_examples=60, deadline=None)
-def test_times_of_a_shape_never_go_back_and_its_ends_are_exact(route: Route):
-    times = [p.time for p in route.points if p.time is not None]
-    assert len(times) in (0, len(route))
-    assert all(a <= b for a, b in zip(times, times[1:]))
+def test_times_of_a_shape_never_go_back(route: Route):
+    found = times(route)
+    assert len(found) in (0, len(route))
+    assert all(a <= b for a, b in zip(found, found[1:]))
     assert np.isfinite(route.places).all()
 
 

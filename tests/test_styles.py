@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from kumite.annotate.actions import DIRECTIONS_OF
 from kumite.control.styles import NAMES, STYLES, Style, short_range, style
 from kumite.errors import KumiteError
 from kumite.kernels import style as columns
+from tests.test_docs import blocks
 
 # Typed from the paper: w_θ, w_r, θ_d [°], r_d [m], w_D⁺ short, long, w_D⁻, w_S (Table III), then
 # w_γ, w_p, w_a (Table IV; styles that are not in it do without).
@@ -115,3 +117,26 @@ def test_hooks_and_uppercuts_are_short_range():
     assert given["attack", "hook"] == given["attack", "uppercut"] == 1e5
     assert {given["attack", way] for way in ("straight", "kick", "slash", "thrust")} == {10.0}
     assert all(w == 0.0 for (kind, _), w in given.items() if kind != "attack")
+
+
+# The document ------------------------------------------------------------------------------------
+
+DOCUMENT = "docs/styles.md"
+
+
+def test_the_document_has_the_same_numbers():
+    rows = {}
+    for line in (Path(__file__).parents[1] / DOCUMENT).read_text("utf-8").split("\n"):
+        cells = [c.strip() for c in line.strip("|").split("|")]
+        if cells[0] in STYLES:
+            given = cells[5].split(" / ")
+            cells[5:6] = given if len(given) == 2 else given * 2
+            ten = {"10⁶": "1e6", "10⁵": "1e5", "10²": "1e2"}
+            rows[cells[0]] = [float(ten.get(c, c.removesuffix(" m"))) for c in cells[1:]]
+    assert rows == ROWS
+
+
+def test_the_documents_python_runs(capsys: pytest.CaptureFixture[str]):
+    for block in blocks("python", DOCUMENT):
+        exec(block, {})
+    assert capsys.readouterr().out.startswith("(3.0, 2.0) ()")

@@ -1,5 +1,16 @@
 """Controllers: given what a character sees, choose its next action."""
 
+from kumite.control.combination import (
+    HIT_DIRECTIONS,
+    POSITIONS,
+    Annotations,
+    CombinationTable,
+    Entry,
+    Pair,
+    annotate_actions,
+    build_table,
+)
+from kumite.control.combination_file import read_table, write_table
 from kumite.control.fighter import Fighters, Skill, Temper
 from kumite.control.grid import TargetGrid, approach_grid, heading_grid, strike_grid
 from kumite.control.policy import (
@@ -15,30 +26,51 @@ from kumite.control.policy import (
     strike,
     take_place,
 )
+from kumite.control.routes import CheckPoint, Missed, Progress, Reached, Route
+from kumite.control.styles import STYLES, Style, short_range, style
 from kumite.control.trained import cache_folder, trained
 from kumite.control.worth import Worth, measure_worth
 
 __all__ = [
     "BEHAVIOURS",
+    "HIT_DIRECTIONS",
+    "POSITIONS",
+    "STYLES",
+    "Annotations",
     "Behaviour",
+    "CheckPoint",
+    "CombinationTable",
+    "Entry",
     "Fighters",
+    "Missed",
+    "Pair",
     "Policy",
+    "Progress",
+    "Reached",
+    "Route",
     "Skill",
     "Station",
+    "Style",
     "TargetGrid",
     "Temper",
     "Worth",
+    "annotate_actions",
     "approach",
     "approach_grid",
+    "build_table",
     "cache_folder",
     "circle",
     "heading_grid",
     "keep_off",
     "measure_worth",
+    "read_table",
+    "short_range",
     "solve",
     "stretch_tracks",
     "strike",
     "strike_grid",
+    "style",
     "take_place",
     "trained",
+    "write_table",
 ]

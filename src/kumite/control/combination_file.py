@@ -141,9 +141,8 @@ def _merged(path: Path, source: str, found: CombinationTable, *, again: bool) ->
             line = toml.line_of(source, "pair", k)
             what = f"{one.action!r} against {one.opponent!r} for the second time; expected one pair"
             wrong.append(str(at(path, line, what)))
-        if known(one.action, None, "pair", k, "action") and known(
-            one.opponent, None, "pair", k, "opponent"
-        ):
+        mine = known(one.action, None, "pair", k, "action")
+        if known(one.opponent, None, "pair", k, "opponent") and mine:
             pairs[one.action, one.opponent] = Pair(one.action, one.opponent, one.suitability)
     if wrong:
         raise KumiteError("\n".join(wrong))
