@@ -69,7 +69,7 @@ class Cast:
             self.jump,
             library.table.first,
             library.table.last,
-            _blow_windows(library),
+            blow_windows(library),
             SPRINGS,
             capture,
             build,
@@ -186,7 +186,7 @@ def _below(skeleton: Skeleton, legs: list[list[int]]) -> np.ndarray:
     return out
 
 
-def _blow_windows(library: Library) -> np.ndarray:
+def blow_windows(library: Library) -> np.ndarray:
     """The blow [F, 4] int32 that each limb throws at a frame, or NO_BLOW."""
     strikes, clips = library.strikes, library.clips
     out = np.full((len(clips), 4), NO_BLOW, dtype=np.int32)

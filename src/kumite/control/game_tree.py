@@ -1,0 +1,319 @@
+"""Fighters that compete and cooperate by game tree (Shum et al. 2012).
+
+A decision expands what both may do for some levels (:mod:`kumite.kernels.game`), by the exact
+search of :mod:`kumite.kernels.search`. Nothing is precomputed but the geometry of the actions:
+styles, check points, wanted actions and depth may change between any two decisions (B12).
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from kumite.annotate import KINDS
+from kumite.body import lay_body
+from kumite.control.combination import build_table
+from kumite.control.styles import STYLES, VULNERABILITY, Style, short_range
+from kumite.errors import KumiteError
+from kumite.graph import Library
+from kumite.kernels import game as kernels
+from kumite.kernels.blow import NO_BLOW
+from kumite.kernels.game import FALL, FLINCH, NOTHING, SIZES, STAGGER
+from kumite.kernels.search import make_search
+from kumite.rotation import planar_apply, planar_compose, planar_inverse, rotate
+from kumite.synthesis.cast import blow_windows
+from kumite.synthesis.response import find_responses
+
+TRUNK = ("head", "chest", "waist", "pelvis")
+ARMS = ("left_forearm", "left_hand", "right_forearm", "right_hand")
+STOUTER = 1.1  # the spheres of a part are that much thicker than its capsule: they stand for all
+DEEPEST = 6  # levels; a seventh would take hours
+BOREDOM = 0.5  # share of its gain that an action loses while it was used recently
+MEMORY = 4  # actions back that "recently" goes
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What is pruned (section V-C) and what counts as what."""
+
+    every: float = 0.1  # s between poses of which bodies are compared
+    facing: float = np.radians(60.0)  # rad from the opponent at the end of an action, at most
+    attack_range: float = 1.0  # m
+    defence_range: float = 3.0  # m
+    tip_radius: float = 0.03  # m, of a fist's front
+    catch: float = 0.0  # m between two that counts as caught; 0: nobody is
+    stagger_from: float = 5.2  # m/s of a blow that staggers
+    fall_from: float = 10.0  # m/s of a blow that fells
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not np.isfinite(value) or value < 0 or (value == 0 and name != "catch"):
+                raise KumiteError(f"rules: {name} {value}; expected more than 0")
+
+
+@dataclass
+class Player:
+    """How one side plays. All of it may be changed while the scene runs."""
+
+    style: Style = field(default_factory=lambda: STYLES["boxer"])
+    depth: int = 3  # levels of the tree
+    wanted: tuple[str, ...] = ()  # A⁺, kinds or labels of actions
+    unwanted: tuple[str, ...] = ()  # A⁻
+    goal: tuple[float, float] | None = None  # m, the next check point
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.depth <= DEEPEST:
+            raise KumiteError(f"depth {self.depth}; expected 1 to {DEEPEST}")
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What was chosen, and out of how much."""
+
+    stretch: int
+    comp: float  # of the best line of play
+    coop: float
+    nodes: np.ndarray  # [D + 1] at each depth, the root at 0
+    considered: np.ndarray  # [D + 1] the same before pruning
+    seconds: float
+
+    @property
+    def pruned(self) -> float:
+        """Share of the actions looked at that were not considered further."""
+        return 1.0 - float(self.nodes[1:].sum()) / max(float(self.considered[1:].sum()), 1.0)
+
+
+SEARCH = make_search(kernels.expand, kernels.leaves)
+
+
+class GameTree:
+    """The game that a library of whole actions is, and the search of it."""
+
+    def __init__(
+        self, library: Library, rules: Rules | None = None, suits: np.ndarray | None = None
+    ) -> None:
+        """suits [A, A]: S of the library's actions against each other, by default as
+        :func:`build_table` finds it. Errors: the graph is not one of whole actions.
+        """
+        self.library = library
+        self.rules = rules or Rules()
+        action = library.action_of_stretch
+        actions = library.actions
+        assert actions is not None  # action_of_stretch has looked
+        if suits is None:
+            suits = build_table(library, actions).suitability
+        self.suits = np.ascontiguousarray(suits[np.ix_(action, action)], dtype=np.float32)
+        self.kinds = tuple(KINDS[k] for k in actions.kind[action].tolist())
+        self.labels = tuple(actions.label[a] for a in action.tolist())
+        self.moves = _moves(library)
+        self.response = self._responses()
+        self.most = int(np.diff(library.table.action_start).max())
+
+    @cached_property
+    def names(self) -> frozenset[str]:
+        """Kinds and labels that A⁺ and A⁻ may name."""
+        return frozenset(self.kinds) | frozenset(self.labels)
+
+    def asked(self, player: Player) -> np.ndarray:
+        """1 of each stretch in A⁺, -1 in A⁻, else 0 [L]. Errors: names that no action has; A⁻
+        holds all that can be chosen.
+        """
+        unknown = sorted({*player.wanted, *player.unwanted} - self.names)
+        if unknown:
+            raise KumiteError(
+                f"no action is called {', '.join(map(repr, unknown))}; expected kinds "
+                f"({', '.join(sorted(set(self.kinds)))}) or labels of the library"
+            )
+        out = np.zeros(len(self.kinds))
+        for k, names in enumerate(zip(self.kinds, self.labels)):
+            out[k] = any(n in player.wanted for n in names) - any(
+                n in player.unwanted for n in names
+            )
+        offered = np.unique(self.moves.stretch)
+        if player.unwanted and np.all(out[offered] < 0):
+            raise KumiteError("A⁻ holds every action that can be chosen; expected one to be left")
+        return out
+
+    def _responses(self) -> np.ndarray:
+        """Stretches [2, SIZES] that answer a blow to the trunk and to the head, or NOTHING.
+
+        Of each size the one in which the body goes straightest back; where none has a size, the
+        next smaller one.
+        """
+        table, kinds = self.library.table, np.array(self.kinds)
+        reaction = np.flatnonzero(kinds == "reaction")
+        out = np.full((2, SIZES), NOTHING)
+        if len(reaction) == 0:
+            return out
+        spans = [(int(table.first[k]), int(table.last[k])) for k in reaction]
+        found = find_responses(self.library.clips, spans)
+        size = np.array([found.size[found.response == r].max() for r in range(len(spans))])
+        back = -table.displacement[reaction, 1] - np.abs(table.displacement[reaction, 0])
+        for wanted in (FLINCH, STAGGER, FALL):
+            there = np.flatnonzero(size == wanted)
+            order = reaction[there[np.argsort(-back[there], kind="stable")]]
+            if len(order):
+                out[0, wanted], out[1, wanted] = order[min(1, len(order) - 1)], order[0]
+            elif wanted > FLINCH:
+                out[:, wanted] = out[:, wanted - 1]
+        return out
+
+    def state(
+        self,
+        stretches: tuple[int, int],
+        begun: tuple[float, float],
+        ends: tuple[float, float],
+        facing: tuple[np.ndarray, np.ndarray],
+        now: float,
+    ) -> np.ndarray:
+        """The state of two players at a time [frames], the searcher first.
+
+        facing: the planar frames [3] in which they are now; begun: when their stretches began.
+        """
+        out = np.empty(kernels.STATE)
+        for p in range(2):
+            k = stretches[p]
+            i = int(np.clip(now - begun[p], 0, self.moves.duration[k]))
+            here = self.moves.track[self.moves.start[k] + i]
+            anchor = planar_compose(facing[p], planar_inverse(here))
+            out[p * kernels.FIELDS : (p + 1) * kernels.FIELDS] = [
+                k,
+                begun[p],
+                ends[p],
+                *anchor,
+                NOTHING,
+            ]
+        return out
+
+    def game(self, players: tuple[Player, Player]) -> kernels.Game:
+        """What the search needs besides the state."""
+        r, fps = self.rules, self.library.clips.fps
+        vulnerable = np.array(
+            [VULNERABILITY["head" if p == "head" else "torso"] for p in TRUNK]
+            + [VULNERABILITY["limbs"]] * len(ARMS)
+        )
+        rules = kernels.Rules(
+            max(1, round(r.every * fps)),
+            float(r.facing),
+            float(r.attack_range),
+            float(r.defence_range),
+            float(r.tip_radius),
+            float(r.catch),
+            float(r.stagger_from),
+            float(r.fall_from),
+            vulnerable,
+        )
+        weights = np.stack([p.style.as_array() for p in players])
+        goal = np.zeros((2, 2))
+        for p, player in enumerate(players):
+            if player.goal is None:
+                weights[p, kernels.PLACE] = 0.0
+            else:
+                goal[p] = player.goal
+        return kernels.Game(
+            self.moves,
+            rules,
+            weights,
+            self.suits,
+            np.stack([self.asked(p) for p in players]),
+            goal,
+            self.response,
+        )
+
+    def decide(
+        self,
+        state: np.ndarray,
+        players: tuple[Player, Player],
+        recent: tuple[int, ...] = (),
+        *,
+        parallel: bool = True,
+    ) -> Decision:
+        """What the searcher, the first of players, does next in a state (:meth:`state`).
+
+        recent: stretches it used lately; each loses half of what it gains over the usual action
+        (B11). It looks as deep as the searcher's depth says.
+        """
+        begin = time.perf_counter()
+        run = SEARCH.parallel if parallel else SEARCH.serial
+        game, depth = self.game(players), players[0].depth
+        found = run(game, state, depth, self.most, False)
+        score = found.comp + found.coop
+        gain = score - np.median(score)
+        gain[np.isin(found.action, recent)] -= BOREDOM * np.abs(gain[np.isin(found.action, recent)])
+        best = int(np.argmax(gain))
+        return Decision(
+            int(found.action[best]),
+            float(found.comp[best]),
+            float(found.coop[best]),
+            found.nodes,
+            found.considered,
+            time.perf_counter() - begin,
+        )
+
+
+def _moves(library: Library) -> kernels.Moves:
+    """The stretches as the kernels take them."""
+    table, clips = library.table, library.clips
+    skeleton, body = clips.skeleton, lay_body(clips.skeleton)
+    position, world = clips.world
+    facing = clips.facing
+    duration = table.duration
+    start = np.concatenate([[0], np.cumsum(duration + 1)]).astype(np.int64)
+    owner = np.repeat(np.arange(len(duration)), duration + 1)
+    local = np.arange(start[-1]) - start[owner]
+    frame = table.first[owner] - 1 + local
+    home = planar_inverse(facing[table.first - 1])[owner]
+    track = planar_compose(home, facing[frame])
+    middle = []
+    for part in (*TRUNK, *ARMS):
+        b = body.part(part)
+        j = int(body.joint[b])
+        at = position[:, j] + rotate(world[:, j], 0.5 * (body.start[b] + body.end[b]))
+        middle.append(planar_apply(home, at[frame]))
+    spheres = np.stack(middle, axis=1)  # [R, B, 3]
+    parts = [body.part(p) for p in (*TRUNK, *ARMS)]
+    radius = STOUTER * np.maximum(body.radius_start[parts], body.radius_end[parts])
+    off = np.hypot(
+        spheres[:, : len(TRUNK), 0] - track[:, None, 0],
+        spheres[:, : len(TRUNK), 2] - track[:, None, 1],
+    ).max(axis=1)
+    windows = blow_windows(library)
+    row, limb = np.nonzero((windows[frame] != NO_BLOW) & (local > 0)[:, None])
+    tips = np.moveaxis(library.strikes.tip, 1, 0)  # [4, F, 3] in each frame's facing frame
+
+    def placed(f: np.ndarray) -> np.ndarray:
+        return planar_apply(planar_compose(home[row], facing[f]), tips[limb, f])
+
+    now, before = placed(frame[row]), placed(frame[row] - 1)
+    speed = np.linalg.norm(now - before, axis=1) * clips.fps
+    last_tip = np.full(len(duration), NOTHING)
+    np.maximum.at(last_tip, owner[row], local[row])
+    actions, action = library.actions, library.action_of_stretch
+    assert actions is not None
+    kind = np.full(len(duration), kernels.OTHER)
+    for name, code in (("attack", kernels.ATTACK), ("defence", kernels.DEFENCE)):
+        kind[actions.kind[action] == KINDS.index(name)] = code
+    kind[actions.kind[action] == KINDS.index("idle")] = kernels.IDLE
+    return kernels.Moves(
+        table.action_start.astype(np.int64),
+        table.stretch.astype(np.int64),
+        table.target.astype(np.int64),
+        duration.astype(np.int64),
+        kind.astype(np.int64),
+        short_range(actions)[action],
+        start,
+        np.ascontiguousarray(track),
+        np.maximum.reduceat(off, start[:-1]),
+        spheres.astype(np.float32),
+        radius,
+        np.searchsorted(owner[row], np.arange(len(duration) + 1)).astype(np.int64),
+        local[row].astype(np.int64),
+        np.ascontiguousarray(now),
+        np.ascontiguousarray(before),
+        speed,
+        windows[frame[row], limb].astype(np.int64),
+        last_tip.astype(np.int64),
+    )
