@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 from numba import njit
@@ -17,12 +18,20 @@ _SOURCES = hashlib.sha256(
 ).hexdigest()
 
 
+def _stamp(dispatcher: Any, *more: Any) -> None:
+    """Keep its compiled code only while all our files, its own (it may be elsewhere) and those
+    behind ``more`` dispatchers are the same."""
+    # Not a public name; where it is gone (or nothing is compiled) Numba's own rule holds.
+    with contextlib.suppress(AttributeError):
+        file = dispatcher._cache._cache_file
+        others = tuple(other._cache._cache_file._source_stamp for other in more)
+        file._source_stamp = (_SOURCES, file._source_stamp, *others)
+
+
 def _kept_while_all_sources_are(decorate: Callable[..., Any]) -> Callable[..., Any]:
     def compile_lazily(function: Callable[..., Any]) -> Any:
         dispatcher = decorate(function)
-        # Not a public name; where it is gone (or nothing is compiled) Numba's own rule holds.
-        with contextlib.suppress(AttributeError):
-            dispatcher._cache._cache_file._source_stamp = _SOURCES
+        _stamp(dispatcher)
         return dispatcher
 
     return compile_lazily
@@ -37,3 +46,32 @@ kernel = _kept_while_all_sources_are(
 parallel_kernel = _kept_while_all_sources_are(
     njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, parallel=True)
 )
+
+
+def plugged(template: Callable[..., Any], parallel: bool = False, **plugs: Any) -> Any:
+    """A kernel made of a plain function in which each name in ``plugs`` is the kernel given.
+
+    It is kept on disk like any other, which neither a closure over kernels nor a kernel as an
+    argument is: Numba finds kept code by their identity, which is new in every process. Here it is
+    found by the file and the name of the plugs, so these must be functions of a module. Outside of
+    this folder only the plugs' own files are watched for changes, not those they call.
+
+    Nothing is contracted: a sum in the template must not depend on whether a plug was inlined.
+    """
+    names = [template.__qualname__, str(parallel)]
+    for name, plug in sorted(plugs.items()):
+        plain = getattr(plug, "py_func", plug)
+        if "<" in plain.__qualname__:
+            raise TypeError(f"{plain.__qualname__}: only functions of a module can be plugged in")
+        names += [name, plain.__code__.co_filename, plain.__qualname__]
+    code = template.__code__
+    copy = FunctionType(code, {**template.__globals__, **plugs}, template.__name__)
+    copy.__qualname__ = f"{template.__qualname__}_{_digest(names)}"
+    copy.__doc__ = template.__doc__
+    dispatcher = njit(cache=True, nogil=True, error_model="numpy", parallel=parallel)(copy)
+    _stamp(dispatcher, *plugs.values())
+    return dispatcher
+
+
+def _digest(names: list[str]) -> str:
+    return hashlib.sha256("\0".join(names).encode()).hexdigest()[:12]

@@ -1,0 +1,317 @@
+"""Exact game-tree search over states that are rows of numbers; games are plugged in.
+
+A node is the moment when either player is about to choose (Shum, Komura, Shiraishi, Yamazaki 2012,
+section V-A). Actions differ in length, so the players need not take turns: the game says who
+chooses. Edges add to two scores along the path, S_comp and S_coop (Eq. 1); both are copied up from
+the child that whoever chooses prefers (Eqs. 2, 3). Depth is the number of levels below the root,
+whoever chooses at each.
+
+A game is any NamedTuple of arrays and numbers, handed on untouched, and two functions compiled with
+``@kernel``:
+
+``expand(game, state, children) -> (count, considered, player)``
+    fills the first ``count`` rows of ``children`` with what can be done in ``state`` [S]: at most
+    as many as the search was given room for. ``comp`` and ``coop`` are what the edge adds, as the
+    searcher sees it: F_comp of its own actions, -F_comp of its opponent's, F_coop of either's.
+    ``considered``: actions before pruning. ``player``: who chooses, SEARCHER or OPPONENT. A forced
+    edge, such as the reaction to a hit, is a list of one. Where ``count`` is 0 the node is a leaf.
+
+``leaves(game, children, count)``
+    adds what is expected beyond the tree to ``comp`` and ``coop`` of the first ``count`` rows, in
+    which the sums along the path stand already.
+
+The tree is walked depth-first with one list of children per level, so memory does not grow with
+the number of nodes. Game tuples are handed over once per expanded node, never once per leaf.
+
+Shapes: M children at most, S numbers in a state, D levels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import prange
+
+from kumite.kernels.jit import kernel, plugged
+
+SEARCHER, OPPONENT = 0, 1  # who chooses: a max node, a min node
+NO_CHILD = -1
+TASKS = 64  # subtrees at least, where the levels allow: the tree is split at the first with as many
+WORKERS = 64  # take turns at the subtrees, so that a large one does not keep its neighbours waiting
+
+
+class Children(NamedTuple):
+    """Nodes side by side, and the edges that lead to them."""
+
+    action: np.ndarray  # [n] int64
+    comp: np.ndarray  # [n] added by the edge; then the sum along the path; then what is copied up
+    coop: np.ndarray  # [n]
+    state: np.ndarray  # [n, S]
+
+
+class Levels(NamedTuple):
+    """How far each level of a depth-first walk is; row 0 is the node it starts from."""
+
+    at: np.ndarray  # [D + 1] the child it is at
+    count: np.ndarray  # [D + 1] children
+    player: np.ndarray  # [D + 1] who chooses among them
+    low: np.ndarray  # [D + 1] S_comp below which it makes no difference at the root
+    high: np.ndarray  # [D + 1] S_comp above which it does not
+
+
+class Found(NamedTuple):
+    """The children of the root, in the game's order, and how large the tree was."""
+
+    action: np.ndarray  # [n]
+    comp: np.ndarray  # [n] copied up
+    coop: np.ndarray  # [n]
+    best: int  # the child that is chosen, the first of equals; NO_CHILD where there is none
+    nodes: np.ndarray  # [D + 1] made at each depth, the root at 0: the actions kept
+    considered: np.ndarray  # [D + 1] the same before the game's pruning
+
+
+def expand(game, state, children):
+    """Stands where a game's own is plugged in: nothing can be done."""
+    return 0, 0, SEARCHER
+
+
+@kernel
+def no_more(game, children, count):
+    """``leaves`` of a game whose scores end with the tree."""
+
+
+leaves = no_more  # stands where a game's own is plugged in
+
+
+@kernel
+def empty_children(count, size):
+    """Room for ``count`` nodes whose states have ``size`` numbers."""
+    return Children(
+        np.empty(count, dtype=np.int64), np.empty(count), np.empty(count), np.empty((count, size))
+    )
+
+
+@kernel
+def part(children, first, stop):
+    """Rows ``first`` to ``stop``, not copied."""
+    return Children(
+        children.action[first:stop],
+        children.comp[first:stop],
+        children.coop[first:stop],
+        children.state[first:stop],
+    )
+
+
+@kernel
+def copy_row(source, n, target, m):
+    """Row n of one becomes row m of the other."""
+    target.action[m] = source.action[n]
+    target.comp[m], target.coop[m] = source.comp[n], source.coop[n]
+    for s in range(source.state.shape[1]):
+        target.state[m, s] = source.state[n, s]
+
+
+@kernel
+def add_path(nodes, n, first, count):
+    """Eq. 1: what the edges to node n's children add becomes the sum along the path."""
+    comp, coop = nodes.comp, nodes.coop
+    for c in range(first, first + count):
+        comp[c] += comp[n]
+        coop[c] += coop[n]
+
+
+@kernel
+def preferred(nodes, first, count, player):
+    """Eq. 3: the row that ``player`` chooses, the first of equals."""
+    comp, coop = nodes.comp, nodes.coop
+    sign = 1.0 if player == SEARCHER else -1.0  # argmin(comp - coop) = argmax(-comp + coop)
+    best, most = first, sign * comp[first] + coop[first]
+    for c in range(first + 1, first + count):
+        score = sign * comp[c] + coop[c]
+        if score > most:
+            best, most = c, score
+    return best
+
+
+@kernel
+def copy_up(nodes, n, first, count, player):
+    """Eq. 2: node n has the scores of the child that ``player`` chooses."""
+    best = preferred(nodes, first, count, player)
+    nodes.comp[n], nodes.coop[n] = nodes.comp[best], nodes.coop[best]
+
+
+@kernel
+def narrow(levels, d, comp):
+    """A child at level d is worth ``comp``: True where the rest of them make no difference.
+
+    Alpha-beta (Knuth, Moore 1975): whoever chose above already has something as good.
+    """
+    if levels.player[d] == SEARCHER:
+        levels.low[d] = max(levels.low[d], comp)
+    else:
+        levels.high[d] = min(levels.high[d], comp)
+    return levels.low[d] >= levels.high[d]
+
+
+def descend(game, depth, most, block, levels, prune, nodes, considered):
+    """Search ``depth`` levels below row 0 of ``block``, whose scores are the sums along its path.
+
+    Then they are those copied up. block [(depth + 1) M]: level d's children from row d M on. nodes,
+    considered [depth + 1] are added to, but for the node itself. Where ``prune`` is set all of coop
+    is 0, and outside of levels.low[0] and high[0] scores are only bounds.
+    """
+    if depth == 0:
+        leaves(game, part(block, 0, 1), 1)
+        return
+    at, count, player, low, high = levels
+    d, at[0], count[0] = 0, 0, 1
+    while True:
+        n, below = d * most + at[d], (d + 1) * most
+        children = part(block, below, below + most)
+        kept, before, player[d + 1] = expand(game, block.state[n], children)
+        nodes[d + 1] += kept
+        considered[d + 1] += before
+        add_path(block, n, below, kept)
+        if kept > 0 and d + 1 < depth:
+            d += 1
+            at[d], count[d] = 0, kept
+            low[d], high[d] = low[d - 1], high[d - 1]
+            continue
+        if kept > 0:
+            leaves(game, children, kept)
+            copy_up(block, n, below, kept, player[d + 1])
+        else:
+            leaves(game, part(block, n, n + 1), 1)
+        at[d] += 1
+        while d > 0 and (
+            at[d] == count[d] or (prune and narrow(levels, d, block.comp[d * most + at[d] - 1]))
+        ):
+            copy_up(block, (d - 1) * most + at[d - 1], d * most, at[d], player[d])
+            d -= 1
+            at[d] += 1
+        if d == 0:
+            return
+
+
+class Top(NamedTuple):
+    """The first levels of the tree, one after the other."""
+
+    nodes: Children
+    child: np.ndarray  # [expanded] row of the first child
+    count: np.ndarray  # [expanded] children
+    player: np.ndarray  # [expanded] who chooses among them
+    made: np.ndarray  # [D + 1] nodes at each depth
+    considered: np.ndarray  # [D + 1]
+
+
+def expand_top(game, state, depth, most, enough):
+    """The levels of the tree from ``state`` [S] down to the first with ``enough`` nodes.
+
+    The root is always expanded, the parents of the last level are only where the root is one.
+    Returns a Top, the number of levels and the rows of the last (first, stop): what is below them
+    is still to be searched.
+    """
+    room = 1 + depth * enough
+    top = Top(
+        empty_children(1 + depth * enough * most, len(state)),
+        np.empty(room, np.int64),
+        np.empty(room, np.int64),
+        np.empty(room, np.int64),
+        np.zeros(depth + 1, np.int64),
+        np.zeros(depth + 1, np.int64),
+    )
+    nodes, child, count, player = top.nodes, top.child, top.count, top.player
+    nodes.comp[0] = nodes.coop[0] = 0.0
+    nodes.state[0] = state
+    top.made[0] = top.considered[0] = 1
+    start, stop, level = 0, 1, 0
+    while level < depth and (level == 0 or (0 < stop - start < enough and level < depth - 1)):
+        end = stop
+        for n in range(start, stop):
+            child[n] = end
+            children = part(nodes, end, end + most)
+            count[n], before, player[n] = expand(game, nodes.state[n], children)
+            if count[n] == 0:
+                leaves(game, part(nodes, n, n + 1), 1)
+            add_path(nodes, n, end, count[n])
+            end += count[n]
+            top.considered[level + 1] += before
+        start, stop, level = stop, end, level + 1
+        top.made[level] = stop - start
+    return top, level, start, stop
+
+
+def work(game, nodes, start, stop, left, most, player, prune, made, considered):
+    """Search ``left`` levels below nodes ``start`` to ``stop``, between which ``player`` chooses.
+
+    made, considered [workers, left + 1] are added to. A worker takes every so many nodes, and has
+    its own room.
+    """
+    workers = made.shape[0]
+    for w in prange(workers):
+        block = empty_children((left + 1) * most, nodes.state.shape[1])
+        levels = Levels(
+            np.empty(left + 1, np.int64),
+            np.empty(left + 1, np.int64),
+            np.empty(left + 1, np.int64),
+            np.full(left + 1, -np.inf),
+            np.full(left + 1, np.inf),
+        )
+        levels.player[0] = player
+        for n in range(start + w, stop, workers):
+            copy_row(nodes, n, block, 0)
+            descend(game, left, most, block, levels, prune, made[w], considered[w])
+            copy_row(block, 0, nodes, n)
+            if prune:
+                narrow(levels, 0, block.comp[0])
+
+
+def search(game, state, depth, most, prune):
+    """Search ``depth`` levels below ``state`` [S], of no more than ``most`` children each: a Found.
+
+    Workers search below the first levels; what they find is put together in the tree's order. So
+    the result does not depend on the number of threads.
+
+    prune: skip what cannot change the choice and its scores. Only for games in which all of coop
+    is 0; children of the root that are not chosen may then have a bound instead of their scores
+    (not better than the best one's for whoever chooses), and the work is done on one core.
+    """
+    # Workers know nothing of each other's bounds; one that starts below the root has them all.
+    enough, workers = (1, 1) if prune else (TASKS, WORKERS)
+    top, level, start, stop = expand_top(game, state, depth, most, enough)
+    workers = min(workers, stop - start)
+    made = np.zeros((workers, depth - level + 1), np.int64)
+    considered = np.zeros((workers, depth - level + 1), np.int64)
+    player = top.player[0]
+    work(game, top.nodes, start, stop, depth - level, most, player, prune, made, considered)
+    for w in range(workers):
+        for d in range(depth - level + 1):
+            top.made[level + d] += made[w, d]
+            top.considered[level + d] += considered[w, d]
+    for n in range(start - 1, -1, -1):
+        if top.count[n] > 0:
+            copy_up(top.nodes, n, top.child[n], top.count[n], top.player[n])
+    count = top.count[0] if depth > 0 else 0
+    best = preferred(top.nodes, 1, count, player) - 1 if count > 0 else NO_CHILD
+    action, comp, coop, _ = part(top.nodes, 1, 1 + count)
+    return Found(action.copy(), comp.copy(), coop.copy(), best, top.made, top.considered)
+
+
+class Search(NamedTuple):
+    """``search`` of one game: (game, state, depth, most, prune) -> Found."""
+
+    serial: Any  # on the calling thread
+    parallel: Any  # on all cores; the same bytes
+
+
+def make_search(expand: Callable[..., Any], leaves: Callable[..., Any] = no_more) -> Search:
+    """The search of the game that ``expand`` and ``leaves`` play, compiled when first called."""
+    game = {"expand": expand, "leaves": leaves}
+    walk, begin = plugged(descend, **game), plugged(expand_top, **game)
+    serial, parallel = (plugged(work, descend=walk, parallel=p) for p in (False, True))
+    return Search(
+        plugged(search, expand_top=begin, work=serial),
+        plugged(search, expand_top=begin, work=parallel),
+    )
