@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -148,3 +149,49 @@ def first_touch(p0, p1, a0, a1, b0, b1, radius_a, radius_b, radius, steps=4000):
         if np.linalg.norm(p - a - s * ab) - (radius_a + s * (radius_b - radius_a)) <= radius:
             return t
     return None
+
+
+class Edge(NamedTuple):
+    action: int
+    comp: float  # as the searcher sees it
+    coop: float
+    state: Any
+
+
+class PlainGame(Protocol):
+    def player(self, state: Any) -> int: ...  # 0: the searcher
+    def edges(self, state: Any) -> list[Edge]: ...
+    def considered(self, state: Any) -> int: ...  # edges before pruning
+    def leaf(self, state: Any) -> tuple[float, float]: ...
+
+
+class PlainFound(NamedTuple):
+    comp: float
+    coop: float
+    best: int | None
+    children: list[tuple[int, float, float]]  # action and scores copied up
+    nodes: list[int]
+    considered: list[int]
+
+
+def game_tree(
+    game: PlainGame, state: Any, depth: int, comp: float = 0.0, coop: float = 0.0
+) -> PlainFound:
+    """Eqs. 1-3 of Shum et al. 2012 as they are written; comp, coop: the sums of the way here."""
+    nodes, considered = [1] + [0] * depth, [1] + [0] * depth
+    edges = game.edges(state) if depth > 0 else []
+    if depth > 0:
+        considered[1] = game.considered(state)
+    if not edges:
+        more = game.leaf(state)
+        return PlainFound(comp + more[0], coop + more[1], None, [], nodes, considered)
+    below = [game_tree(game, e.state, depth - 1, comp + e.comp, coop + e.coop) for e in edges]
+    for d in range(depth):
+        nodes[d + 1] = sum(child.nodes[d] for child in below)
+        considered[d + 1] += sum(child.considered[d] for child in below if d > 0)
+    if game.player(state) == 0:
+        best = max(range(len(below)), key=lambda n: below[n].comp + below[n].coop)
+    else:
+        best = min(range(len(below)), key=lambda n: below[n].comp - below[n].coop)
+    children = [(e.action, child.comp, child.coop) for e, child in zip(edges, below)]
+    return PlainFound(below[best].comp, below[best].coop, best, children, nodes, considered)

@@ -12,6 +12,29 @@ import pytest
 
 import kumite
 
+PLUGS = """
+import sys
+from kumite.kernels.jit import kernel, plugged
+
+def inner(x):
+    return 0.0
+
+def template(x):
+    return inner(x) + inner(x + 1.0)
+
+@kernel
+def square(x):
+    return 1.0 * x * x
+
+@kernel
+def cube(x):
+    return x * x * x
+
+for plug in (square, cube):
+    made = plugged(template, inner=plug)
+    print(made(2.0), sum(made.stats.cache_hits.values()))
+"""
+
 TIP = """
 import numpy as np
 from kumite.kernels import character
@@ -48,3 +71,27 @@ def test_compiled_code_is_not_kept_when_a_kernel_that_it_calls_changes(tmp_path:
     text = pose.read_text("utf-8")
     pose.write_text(text.replace("out[0] = a[0] * b[0] -", "out[0] = -a[0] * b[0] -"))
     assert run() == -0.5
+
+
+def test_plugged_kernels_are_kept_and_not_confused(tmp_path: Path):
+    script = tmp_path / "plugs.py"
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(Path(kumite.__file__).parent.parent),
+        "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+    }
+
+    def run(text: str) -> list[str]:
+        script.write_text(text, "utf-8")
+        command = [sys.executable, str(script)]
+        done = subprocess.run(
+            command, env=environment, capture_output=True, text=True, check=True, cwd=tmp_path
+        )
+        return done.stdout.split()
+
+    assert run(PLUGS) == ["13.0", "0", "35.0", "0"]
+    assert run(PLUGS) == ["13.0", "1", "35.0", "1"]
+    # The same instructions with another constant, in the template and in a plug: Numba's key for
+    # kept code is the same.
+    assert run(PLUGS.replace("x + 1.0", "x + 2.0")) == ["20.0", "0", "72.0", "0"]
+    assert run(PLUGS.replace("1.0 * x", "2.0 * x")) == ["26.0", "0", "35.0", "0"]

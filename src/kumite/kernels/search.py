@@ -38,8 +38,8 @@ from kumite.kernels.jit import kernel, plugged
 
 SEARCHER, OPPONENT = 0, 1  # who chooses: a max node, a min node
 NO_CHILD = -1
-TASKS = 64  # subtrees at least, where the levels allow: the tree is split at the first with as many
-WORKERS = 64  # take turns at the subtrees, so that a large one does not keep its neighbours waiting
+TASKS = 64  # subtrees to share out: the tree is split at its first level with as many nodes
+WORKERS = 120  # take turns at them: each has large and small ones. Many core counts divide it
 
 
 class Children(NamedTuple):
@@ -206,26 +206,73 @@ class Top(NamedTuple):
     considered: np.ndarray  # [D + 1]
 
 
-def expand_top(game, state, depth, most, enough):
-    """The levels of the tree from ``state`` [S] down to the first with ``enough`` nodes.
+# What does not call the game is compiled once for all games.
 
-    The root is always expanded, the parents of the last level are only where the root is one.
-    Returns a Top, the number of levels and the rows of the last (first, stop): what is below them
-    is still to be searched.
-    """
+
+@kernel
+def only_root(state, depth, most, enough):
+    """A Top with room for every level that has less than ``enough`` nodes, and their children."""
     room = 1 + depth * enough
     top = Top(
-        empty_children(1 + depth * enough * most, len(state)),
+        empty_children(1 + depth * enough * most, state.shape[0]),
         np.empty(room, np.int64),
         np.empty(room, np.int64),
         np.empty(room, np.int64),
         np.zeros(depth + 1, np.int64),
         np.zeros(depth + 1, np.int64),
     )
-    nodes, child, count, player = top.nodes, top.child, top.count, top.player
-    nodes.comp[0] = nodes.coop[0] = 0.0
-    nodes.state[0] = state
+    top.count[0], top.player[0] = 0, SEARCHER
     top.made[0] = top.considered[0] = 1
+    top.nodes.comp[0] = top.nodes.coop[0] = 0.0
+    for s in range(state.shape[0]):
+        top.nodes.state[0, s] = state[s]
+    return top
+
+
+@kernel
+def empty_levels(depth, player):
+    """Levels of a walk from one of the nodes among which ``player`` chooses."""
+    levels = Levels(
+        np.empty(depth + 1, np.int64),
+        np.empty(depth + 1, np.int64),
+        np.empty(depth + 1, np.int64),
+        np.empty(depth + 1),
+        np.empty(depth + 1),
+    )
+    levels.player[0], levels.low[0], levels.high[0] = player, -np.inf, np.inf
+    return levels
+
+
+@kernel
+def put_together(top, start, level, made, considered):
+    """The Found of a tree of which all is known below row ``start`` of its top.
+
+    made, considered [workers, D + 1 - level] are what the workers counted.
+    """
+    for w in range(made.shape[0]):
+        for d in range(made.shape[1]):
+            top.made[level + d] += made[w, d]
+            top.considered[level + d] += considered[w, d]
+    nodes, count, player = top.nodes, top.count, top.player
+    for n in range(start - 1, -1, -1):
+        if count[n] > 0:
+            copy_up(nodes, n, top.child[n], count[n], player[n])
+    best = preferred(nodes, 1, count[0], player[0]) - 1 if count[0] > 0 else NO_CHILD
+    first = part(nodes, 1, 1 + count[0])
+    return Found(
+        first.action.copy(), first.comp.copy(), first.coop.copy(), best, top.made, top.considered
+    )
+
+
+def expand_top(game, state, depth, most, enough):
+    """The levels of the tree from ``state`` [S] down to the first with ``enough`` nodes.
+
+    The root is expanded always, other nodes only where their children are not the tree's last
+    level. Returns a Top, the number of its levels, and the first and stop row of the lowest: what
+    is below these is still to be searched.
+    """
+    top = only_root(state, depth, most, enough)
+    nodes, child, count, player = top.nodes, top.child, top.count, top.player
     start, stop, level = 0, 1, 0
     while level < depth and (level == 0 or (0 < stop - start < enough and level < depth - 1)):
         end = stop
@@ -244,7 +291,7 @@ def expand_top(game, state, depth, most, enough):
 
 
 def work(game, nodes, start, stop, left, most, player, prune, made, considered):
-    """Search ``left`` levels below nodes ``start`` to ``stop``, between which ``player`` chooses.
+    """Search ``left`` levels below nodes ``start`` to ``stop``, among which ``player`` chooses.
 
     made, considered [workers, left + 1] are added to. A worker takes every so many nodes, and has
     its own room.
@@ -252,14 +299,7 @@ def work(game, nodes, start, stop, left, most, player, prune, made, considered):
     workers = made.shape[0]
     for w in prange(workers):
         block = empty_children((left + 1) * most, nodes.state.shape[1])
-        levels = Levels(
-            np.empty(left + 1, np.int64),
-            np.empty(left + 1, np.int64),
-            np.empty(left + 1, np.int64),
-            np.full(left + 1, -np.inf),
-            np.full(left + 1, np.inf),
-        )
-        levels.player[0] = player
+        levels = empty_levels(left, player)
         for n in range(start + w, stop, workers):
             copy_row(nodes, n, block, 0)
             descend(game, left, most, block, levels, prune, made[w], considered[w])
@@ -281,22 +321,12 @@ def search(game, state, depth, most, prune):
     # Workers know nothing of each other's bounds; one that starts below the root has them all.
     enough, workers = (1, 1) if prune else (TASKS, WORKERS)
     top, level, start, stop = expand_top(game, state, depth, most, enough)
-    workers = min(workers, stop - start)
-    made = np.zeros((workers, depth - level + 1), np.int64)
-    considered = np.zeros((workers, depth - level + 1), np.int64)
+    workers, left = min(workers, stop - start), depth - level
+    made = np.zeros((workers, left + 1), np.int64)
+    considered = np.zeros((workers, left + 1), np.int64)
     player = top.player[0]
-    work(game, top.nodes, start, stop, depth - level, most, player, prune, made, considered)
-    for w in range(workers):
-        for d in range(depth - level + 1):
-            top.made[level + d] += made[w, d]
-            top.considered[level + d] += considered[w, d]
-    for n in range(start - 1, -1, -1):
-        if top.count[n] > 0:
-            copy_up(top.nodes, n, top.child[n], top.count[n], top.player[n])
-    count = top.count[0] if depth > 0 else 0
-    best = preferred(top.nodes, 1, count, player) - 1 if count > 0 else NO_CHILD
-    action, comp, coop, _ = part(top.nodes, 1, 1 + count)
-    return Found(action.copy(), comp.copy(), coop.copy(), best, top.made, top.considered)
+    work(game, top.nodes, start, stop, left, most, player, prune, made, considered)
+    return put_together(top, start, level, made, considered)
 
 
 class Search(NamedTuple):
@@ -308,8 +338,8 @@ class Search(NamedTuple):
 
 def make_search(expand: Callable[..., Any], leaves: Callable[..., Any] = no_more) -> Search:
     """The search of the game that ``expand`` and ``leaves`` play, compiled when first called."""
-    game = {"expand": expand, "leaves": leaves}
-    walk, begin = plugged(descend, **game), plugged(expand_top, **game)
+    walk = plugged(descend, expand=expand, leaves=leaves)
+    begin = plugged(expand_top, expand=expand, leaves=leaves)
     serial, parallel = (plugged(work, descend=walk, parallel=p) for p in (False, True))
     return Search(
         plugged(search, expand_top=begin, work=serial),
