@@ -73,6 +73,7 @@ def test_compiled_code_is_not_kept_when_a_kernel_that_it_calls_changes(tmp_path:
     assert run() == -0.5
 
 
+@pytest.mark.slow
 def test_plugged_kernels_are_kept_and_not_confused(tmp_path: Path):
     script = tmp_path / "plugs.py"
     environment = {

@@ -6,8 +6,8 @@ chooses. Edges add to two scores along the path, S_comp and S_coop (Eq. 1); both
 the child that whoever chooses prefers (Eqs. 2, 3). Depth is the number of levels below the root,
 whoever chooses at each.
 
-A game is any NamedTuple of arrays and numbers, handed on untouched, and two functions compiled with
-``@kernel``:
+A game is any NamedTuple of arrays and numbers (no tuples in it: ``prange`` cannot hand these on),
+handed on untouched, and two functions of a module, compiled with ``@kernel``:
 
 ``expand(game, state, children) -> (count, considered, player)``
     fills the first ``count`` rows of ``children`` with what can be done in ``state`` [S]: at most
