@@ -1,6 +1,6 @@
 """Exact game-tree search over states that are rows of numbers; games are plugged in.
 
-A node is the moment when either player is about to choose (Shum, Komura, Shiraishi, Yamazaki 2012,
+A node is the moment when either player is about to choose (Shum, Komura, Yamazaki 2012,
 section V-A). Actions differ in length, so the players need not take turns: the game says who
 chooses. Edges add to two scores along the path, S_comp and S_coop (Eq. 1); both are copied up from
 the child that whoever chooses prefers (Eqs. 2, 3). Depth is the number of levels below the root,
