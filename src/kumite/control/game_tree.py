@@ -214,8 +214,8 @@ class GameTree:
             else:
                 goal[p] = player.goal
         return kernels.Game(
-            self.moves,
-            rules,
+            *self.moves,
+            *rules,
             weights,
             self.suits,
             np.stack([self.asked(p) for p in players]),
@@ -257,7 +257,7 @@ class GameTree:
 def _moves(library: Library) -> kernels.Moves:
     """The stretches as the kernels take them."""
     table, clips = library.table, library.clips
-    skeleton, body = clips.skeleton, lay_body(clips.skeleton)
+    body = lay_body(clips.skeleton)
     position, world = clips.world
     facing = clips.facing
     duration = table.duration
@@ -289,6 +289,8 @@ def _moves(library: Library) -> kernels.Moves:
 
     now, before = placed(frame[row]), placed(frame[row] - 1)
     speed = np.linalg.norm(now - before, axis=1) * clips.fps
+    rank = np.empty(len(library.strikes), dtype=np.int64)
+    rank[np.argsort(library.strikes.frame, kind="stable")] = np.arange(len(rank))
     last_tip = np.full(len(duration), NOTHING)
     np.maximum.at(last_tip, owner[row], local[row])
     actions, action = library.actions, library.action_of_stretch
@@ -314,6 +316,6 @@ def _moves(library: Library) -> kernels.Moves:
         np.ascontiguousarray(now),
         np.ascontiguousarray(before),
         speed,
-        windows[frame[row], limb].astype(np.int64),
+        rank[windows[frame[row], limb]],
         last_tip.astype(np.int64),
     )

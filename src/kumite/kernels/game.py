@@ -63,7 +63,7 @@ class Moves(NamedTuple):
     tip: np.ndarray  # [P, 3] m
     tip_before: np.ndarray  # [P, 3] m, a frame earlier: nothing skips through
     tip_speed: np.ndarray  # [P] m/s
-    tip_blow: np.ndarray  # [P] number of the blow
+    tip_blow: np.ndarray  # [P] number of the blow, ascending in time
     last_tip: np.ndarray  # [L] frames, or NOTHING
 
 
@@ -81,16 +81,58 @@ class Rules(NamedTuple):
     vulnerable: np.ndarray  # [B] of each part
 
 
-class Game(NamedTuple):
-    """All that a search needs besides the state."""
+class Want(NamedTuple):
+    """What the two players are after."""
 
-    moves: Moves
-    rules: Rules
     weights: np.ndarray  # [2, style.COLUMNS]
     suits: np.ndarray  # [L, L] float32, S of one's own stretch against the opponent's
     asked: np.ndarray  # [2, L] 1 in A⁺, -1 in A⁻, else 0
     goal: np.ndarray  # [2, 2] m, the next check point
     response: np.ndarray  # [2, SIZES] stretches of reactions to the trunk and the head, or NOTHING
+
+
+Game = NamedTuple(  # flat, as the search hands it on
+    "Game", [(name, t) for part in (Moves, Rules, Want) for name, t in part.__annotations__.items()]
+)
+
+
+@kernel
+def parts(game):
+    """The Moves, Rules and Want of a game."""
+    return (
+        Moves(
+            game.action_start,
+            game.stretch,
+            game.successor,
+            game.duration,
+            game.kind,
+            game.short,
+            game.start,
+            game.track,
+            game.spread,
+            game.body,
+            game.radius,
+            game.tip_start,
+            game.tip_when,
+            game.tip,
+            game.tip_before,
+            game.tip_speed,
+            game.tip_blow,
+            game.last_tip,
+        ),
+        Rules(
+            game.stride,
+            game.facing,
+            game.attack_range,
+            game.defence_range,
+            game.tip_radius,
+            game.catch,
+            game.stagger_from,
+            game.fall_from,
+            game.vulnerable,
+        ),
+        Want(game.weights, game.suits, game.asked, game.goal, game.response),
+    )
 
 
 @kernel
@@ -149,7 +191,7 @@ def contact(state, p, since, until, moves, rules):
     tip, before = moves.tip, moves.tip_before
     for n in range(moves.tip_start[k], moves.tip_start[k + 1]):
         time = state[a + BEGUN] + when[n]
-        if time <= since or moves.tip_blow[n] == state[a + LANDED]:
+        if time <= since or moves.tip_blow[n] <= state[a + LANDED]:
             continue
         if time > until:
             break
@@ -179,12 +221,11 @@ def contact(state, p, since, until, moves, rules):
 
 
 @kernel
-def land(state, p, n, part, game):
+def land(state, p, n, part, moves, rules, want):
     """Tip n of player p meets a part: damage D (Eq. 6), and the reaction's A⁺ or A⁻ if there is one.
 
     The victim's action is cut short there.
     """
-    moves, rules = game.moves, game.rules
     a, v = p * FIELDS, (1 - p) * FIELDS
     state[a + LANDED] = moves.tip_blow[n]
     damage = moves.tip_speed[n] * rules.vulnerable[part]
@@ -192,24 +233,24 @@ def land(state, p, n, part, game):
         return 0.0, 0.0
     speed = moves.tip_speed[n]
     size = FALL if speed >= rules.fall_from else STAGGER if speed >= rules.stagger_from else FLINCH
-    response = game.response[1 if part == HEAD else 0, size]
+    response = want.response[1 if part == HEAD else 0, size]
     if response == NOTHING:
         return damage, 0.0
     time = state[a + BEGUN] + moves.tip_when[n]
     x, z, yaw = place_at(state, 1 - p, time, moves)
     begin(state, 1 - p, response, time, x, z, yaw, moves)
-    asked = game.asked[1 - p, response] * game.weights[1 - p, REQUIREMENT]
+    asked = want.asked[1 - p, response] * want.weights[1 - p, REQUIREMENT]
     return damage, asked
 
 
 @kernel
-def play_on(state, since, until, both, game):
+def play_on(state, since, until, both, moves, rules, want):
     """What happens after ``since``: until someone chooses, or, with ``both``, until both have ended.
 
     Returns what player 0 and player 1 dealt, weighted by their own w⁺, what they dealt unweighted
     (D of Eq. 6), and coop of reactions. ``state`` is changed by reactions.
     """
-    moves, rules, weights = game.moves, game.rules, game.weights
+    weights = want.weights
     score0, score1, dealt0, dealt1, coop = 0.0, 0.0, 0.0, 0.0, 0.0
     while True:
         ends = (state[END], state[FIELDS + END])
@@ -231,25 +272,26 @@ def play_on(state, since, until, both, game):
                     n1 = NOTHING
         if first == NOTHING:
             return score0, score1, dealt0, dealt1, coop
+        since = when
         # Blows of one frame both land: the state before it counts for both.
         if n0 != NOTHING and n1 != NOTHING:
             kept = state[FIELDS:].copy()
-            d, asked = land(state, 0, n0, part0, game)
+            d, asked = land(state, 0, n0, part0, moves, rules, want)
             reacting = state[FIELDS:].copy()
             state[FIELDS:] = kept
             dealt0, coop = dealt0 + d, coop + asked
             score0 += d * weights[0, GIVEN_SHORT if moves.short[k0] else GIVEN_LONG]
-            d, asked = land(state, 1, n1, part1, game)
+            d, asked = land(state, 1, n1, part1, moves, rules, want)
             dealt1, coop = dealt1 + d, coop + asked
             score1 += d * weights[1, GIVEN_SHORT if moves.short[k1] else GIVEN_LONG]
             if reacting[BEGUN] == when:
                 state[FIELDS:] = reacting
         elif n0 != NOTHING:
-            d, asked = land(state, 0, n0, part0, game)
+            d, asked = land(state, 0, n0, part0, moves, rules, want)
             dealt0, coop = dealt0 + d, coop + asked
             score0 += d * weights[0, GIVEN_SHORT if moves.short[k0] else GIVEN_LONG]
         else:
-            d, asked = land(state, 1, n1, part1, game)
+            d, asked = land(state, 1, n1, part1, moves, rules, want)
             dealt1, coop = dealt1 + d, coop + asked
             score1 += d * weights[1, GIVEN_SHORT if moves.short[k1] else GIVEN_LONG]
 
@@ -348,18 +390,18 @@ def worst_allowed(flaws):
 
 
 @kernel
-def movement(state, p, game):
+def movement(state, p, moves, want):
     """f^mov1 of player p at the end of its action (Eq. 4), and f^mov2 (Eq. 9); both are costs."""
-    weights = game.weights[p]
+    weights = want.weights[p]
     time = state[p * FIELDS + END]
-    x, z, yaw = place_at(state, p, time, game.moves)
-    u, w, _ = place_at(state, 1 - p, time, game.moves)
+    x, z, yaw = place_at(state, p, time, moves)
+    u, w, _ = place_at(state, 1 - p, time, moves)
     r = np.sqrt((u - x) ** 2 + (w - z) ** 2)
     off = abs(wrapped(np.arctan2(u - x, w - z) - yaw - weights[PREFERRED_FACING]))
     comp = -weights[FACING] * off * off - weights[DISTANCE] * (r - weights[PREFERRED_DISTANCE]) ** 2
     coop = 0.0
     if weights[PLACE] != 0.0:
-        coop -= weights[PLACE] * ((game.goal[p, 0] - x) ** 2 + (game.goal[p, 1] - z) ** 2)
+        coop -= weights[PLACE] * ((want.goal[p, 0] - x) ** 2 + (want.goal[p, 1] - z) ** 2)
     if weights[HEADING] != 0.0:
         turned = wrapped(yaw - weights[PREFERRED_HEADING])
         coop -= weights[HEADING] * turned * turned
@@ -380,29 +422,29 @@ def caught(state, since, until, moves, rules):
 
 
 @kernel
-def edge(state, p, k, opposing, game):
+def edge(state, p, k, opposing, moves, rules, want):
     """What it adds that player p begins stretch k in ``state``, where it stands there already.
 
     Returns comp and coop as the searcher sees them; ``state`` becomes that of the next choice.
     """
-    weights, moves, rules = game.weights[p], game.moves, game.rules
+    weights = want.weights[p]
     since = state[p * FIELDS + BEGUN]
-    score0, score1, dealt0, dealt1, coop = play_on(state, since, np.inf, False, game)
+    score0, score1, dealt0, dealt1, coop = play_on(state, since, np.inf, False, moves, rules, want)
     given, taken = (score0, dealt1) if p == 0 else (score1, dealt0)
     until = min(state[END], state[FIELDS + END])
     if caught(state, since, until, moves, rules):
         given += weights[GIVEN_SHORT]
         taken += 1.0
-    comp, there = movement(state, p, game)
-    comp += given - weights[TAKEN] * taken + weights[SUITABILITY] * game.suits[k, opposing]
-    coop += there + weights[REQUIREMENT] * game.asked[p, k]
+    comp, there = movement(state, p, moves, want)
+    comp += given - weights[TAKEN] * taken + weights[SUITABILITY] * want.suits[k, opposing]
+    coop += there + weights[REQUIREMENT] * want.asked[p, k]
     return (comp if p == 0 else -comp), coop
 
 
 @kernel
 def expand(game, state, children):
     """All that whoever is next can do and should consider: see :mod:`kumite.kernels.search`."""
-    moves, rules = game.moves, game.rules
+    moves, rules, want = parts(game)
     p = next_player(state)
     o, q = p * FIELDS, 1 - p
     time = state[o + END]
@@ -426,7 +468,9 @@ def expand(game, state, children):
             child[f] = state[f]
         begin(child, p, stretches[n], time, x, z, yaw, moves)
         children.action[count] = stretches[n]
-        children.comp[count], children.coop[count] = edge(child, p, stretches[n], opposing, game)
+        children.comp[count], children.coop[count] = edge(
+            child, p, stretches[n], opposing, moves, rules, want
+        )
         count += 1
     return count, stretches.shape[0], p
 
@@ -434,11 +478,14 @@ def expand(game, state, children):
 @kernel
 def leaves(game, children, count):
     """What is begun is played to its end, with nobody choosing anything more."""
-    weights = game.weights
+    moves, rules, want = parts(game)
+    weights = want.weights
     for n in range(count):
         state = children.state[n]
         since = min(state[END], state[FIELDS + END])
-        score0, score1, dealt0, dealt1, coop = play_on(state, since, np.inf, True, game)
+        score0, score1, dealt0, dealt1, coop = play_on(
+            state, since, np.inf, True, moves, rules, want
+        )
         if dealt0 > 0.0 or dealt1 > 0.0:
             children.comp[n] += score0 - weights[0, TAKEN] * dealt1
         children.coop[n] += coop
