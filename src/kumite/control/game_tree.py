@@ -23,6 +23,7 @@ from kumite.kernels import game as kernels
 from kumite.kernels.blow import NO_BLOW
 from kumite.kernels.game import FALL, FLINCH, NOTHING, SIZES, STAGGER
 from kumite.kernels.search import make_search
+from kumite.kernels.style import HEADING, PLACE, REQUIREMENT
 from kumite.rotation import planar_apply, planar_compose, planar_inverse, rotate
 from kumite.synthesis.cast import blow_windows
 from kumite.synthesis.response import find_responses
@@ -31,8 +32,9 @@ TRUNK = ("head", "chest", "waist", "pelvis")
 ARMS = ("left_forearm", "left_hand", "right_forearm", "right_hand")
 STOUTER = 1.1  # the spheres of a part are that much thicker than its capsule: they stand for all
 DEEPEST = 6  # levels; a seventh would take hours
-BOREDOM = 0.5  # share of its gain that an action loses while it was used recently
+BOREDOM = 1e5  # score that an action loses while it was used recently: a blow of 1 m/s
 MEMORY = 4  # actions back that "recently" goes
+COOPERATIVE = [HEADING, PLACE, REQUIREMENT]  # columns of weights
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,7 @@ class Player:
     wanted: tuple[str, ...] = ()  # A⁺, kinds or labels of actions
     unwanted: tuple[str, ...] = ()  # A⁻
     goal: tuple[float, float] | None = None  # m, the next check point
+    boredom: float = BOREDOM  # score that an action loses while it was used recently (B11)
 
     def __post_init__(self) -> None:
         if not 1 <= self.depth <= DEEPEST:
@@ -174,6 +177,7 @@ class GameTree:
         facing: the planar frames [3] in which they are now; begun: when their stretches began.
         """
         out = np.empty(kernels.STATE)
+        out[kernels.FRESH] = 1.0
         for p in range(2):
             k = stretches[p]
             i = int(np.clip(now - begun[p], 0, self.moves.duration[k]))
@@ -188,8 +192,8 @@ class GameTree:
             ]
         return out
 
-    def game(self, players: tuple[Player, Player]) -> kernels.Game:
-        """What the search needs besides the state."""
+    def game(self, players: tuple[Player, Player], recent: tuple[int, ...] = ()) -> kernels.Game:
+        """What the search needs besides the state; recent: stretches that the first used lately."""
         r, fps = self.rules, self.library.clips.fps
         vulnerable = np.array(
             [VULNERABILITY["head" if p == "head" else "torso"] for p in TRUNK]
@@ -207,6 +211,8 @@ class GameTree:
             vulnerable,
         )
         weights = np.stack([p.style.as_array() for p in players])
+        tired = np.zeros(len(self.kinds))
+        tired[list(recent)] = players[0].boredom
         goal = np.zeros((2, 2))
         for p, player in enumerate(players):
             if player.goal is None:
@@ -221,6 +227,7 @@ class GameTree:
             np.stack([self.asked(p) for p in players]),
             goal,
             self.response,
+            tired,
         )
 
     def decide(
@@ -229,21 +236,20 @@ class GameTree:
         players: tuple[Player, Player],
         recent: tuple[int, ...] = (),
         *,
-        parallel: bool = True,
+        bounds: bool = True,
     ) -> Decision:
         """What the searcher, the first of players, does next in a state (:meth:`state`).
 
-        recent: stretches it used lately; each loses half of what it gains over the usual action
-        (B11). It looks as deep as the searcher's depth says.
+        recent: stretches it used lately, which cost it (B11). It looks as deep as the searcher's
+        depth says. Where nobody minds check points or wanted actions all of coop is 0, and the
+        search skips what cannot change the choice (``bounds``); nodes are those looked at.
         """
         begin = time.perf_counter()
-        run = SEARCH.parallel if parallel else SEARCH.serial
-        game, depth = self.game(players), players[0].depth
-        found = run(game, state, depth, self.most, False)
-        score = found.comp + found.coop
-        gain = score - np.median(score)
-        gain[np.isin(found.action, recent)] -= BOREDOM * np.abs(gain[np.isin(found.action, recent)])
-        best = int(np.argmax(gain))
+        game = self.game(players, recent)
+        bounds = bounds and not np.any(game.weights[:, COOPERATIVE])
+        run = SEARCH.serial if bounds else SEARCH.parallel
+        found = run(game, state, players[0].depth, self.most, bounds)
+        best = found.best
         return Decision(
             int(found.action[best]),
             float(found.comp[best]),

@@ -26,6 +26,7 @@ from kumite.kernels import distance as kernels
 from kumite.rotation import planar_compose, planar_inverse
 
 ALIKE = 1.2  # rad: poses of one cluster are nearer than that, on average (root of D)
+MOST_WAYS = 64  # actions that a state offers: each kind of label's best joins, turn by turn
 _SPARE = 8  # rows that the kernel may write beyond the last
 
 
@@ -34,13 +35,18 @@ def build_action_library(
     actions: Actions | None = None,
     *,
     alike: float = ALIKE,
+    most_ways: int = MOST_WAYS,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> Library:
     """Notes and the action-level graph of a set of clips.
 
     actions: of these clips, by default as the motion analyser finds them. alike: how far [rad]
-    poses of one node may be apart. Errors: no connected part with two actions that can be chosen.
+    poses of one node may be apart. most_ways: actions that a state offers at most; of more those of
+    each label that join best, label by label in turn, so that a large capture gives smoother joins
+    and not only more of the same. Errors: no connected part with two actions that can be chosen.
     """
+    if most_ways < 2:
+        raise KumiteError(f"most_ways {most_ways}; expected at least 2")
     if not 0 < alike < np.inf:
         raise KumiteError(f"alike {alike}; expected more than 0 rad")
     progress("finding contacts and effective hits")
@@ -68,10 +74,16 @@ def build_action_library(
         )
     order = np.flatnonzero(keep)
     state_frame = last[order]  # ascending: actions are in order and do not overlap
-    offered = [np.flatnonzero(usable[order] & (start_node[order] == n)) for n in end_node[order]]
+    joins = _join_costs(clips, state_frame, enter[order])
+    words = np.unique([actions.label[a] for a in order], return_inverse=True)[1]
+    offered = [
+        _best_of_each(np.flatnonzero(usable[order] & (start_node[order] == n)), joins[s], words)
+        for s, n in enumerate(end_node[order])
+    ]
+    offered = [np.sort(o[:most_ways]) for o in offered]
     counts = np.array([len(o) for o in offered])
     stretch = np.concatenate(offered)
-    cost = _join_costs(clips, np.repeat(state_frame, counts), enter[order][stretch])
+    cost = joins[np.repeat(np.arange(len(order)), counts), stretch]
     facing = clips.facing
     first = enter[order] + 1
     table = ActionTable(
@@ -151,8 +163,17 @@ def _connected(
         keep = left
 
 
+def _best_of_each(found: np.ndarray, cost: np.ndarray, word: np.ndarray) -> np.ndarray:
+    """Actions found, in turn the best of each word: first each word's best, then its second …"""
+    by_cost = found[np.argsort(cost[found], kind="stable")]
+    by_word = by_cost[np.argsort(word[by_cost], kind="stable")]
+    first = np.searchsorted(word[by_word], word[by_word])
+    turn = np.arange(len(by_word)) - first
+    return by_word[np.lexsort((cost[by_word], turn))]
+
+
 def _join_costs(clips: ClipSet, source: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Root of D [n] float32 between the frames that are joined; 0 where the capture goes on."""
+    """Root of D [n, m] float32 between frames; 0 where the capture goes on."""
     frames, index = np.unique(np.concatenate([source, target]), return_inverse=True)
     distance = _distances(clips, frames)
-    return distance[index[: len(source)], index[len(source) :]].astype(np.float32)
+    return distance[np.ix_(index[: len(source)], index[len(source) :])].astype(np.float32)

@@ -34,7 +34,8 @@ from kumite.kernels.style import (
 
 # The state of one player, one after the other; then the time at which the state was reached.
 STRETCH, BEGUN, END, X, Z, YAW, LANDED, FIELDS = range(8)
-STATE = 2 * FIELDS
+FRESH = 2 * FIELDS  # 1 in the state that is decided in, 0 further down the tree
+STATE = FRESH + 1
 NOTHING = -1
 TRUNK = 4  # spheres that must not overlap: head, chest, belly, pelvis; the rest are arms
 HEAD = 0
@@ -89,6 +90,7 @@ class Want(NamedTuple):
     asked: np.ndarray  # [2, L] 1 in A⁺, -1 in A⁻, else 0
     goal: np.ndarray  # [2, 2] m, the next check point
     response: np.ndarray  # [2, SIZES] stretches of reactions to the trunk and the head, or NOTHING
+    tired: np.ndarray  # [L] what it costs the searcher to begin a stretch now: it used it lately
 
 
 Game = NamedTuple(  # flat, as the search hands it on
@@ -131,7 +133,7 @@ def parts(game):
             game.fall_from,
             game.vulnerable,
         ),
-        Want(game.weights, game.suits, game.asked, game.goal, game.response),
+        Want(game.weights, game.suits, game.asked, game.goal, game.response, game.tired),
     )
 
 
@@ -275,17 +277,17 @@ def play_on(state, since, until, both, moves, rules, want):
         since = when
         # Blows of one frame both land: the state before it counts for both.
         if n0 != NOTHING and n1 != NOTHING:
-            kept = state[FIELDS:].copy()
+            kept = state[FIELDS : 2 * FIELDS].copy()
             d, asked = land(state, 0, n0, part0, moves, rules, want)
-            reacting = state[FIELDS:].copy()
-            state[FIELDS:] = kept
+            reacting = state[FIELDS : 2 * FIELDS].copy()
+            state[FIELDS : 2 * FIELDS] = kept
             dealt0, coop = dealt0 + d, coop + asked
             score0 += d * weights[0, GIVEN_SHORT if moves.short[k0] else GIVEN_LONG]
             d, asked = land(state, 1, n1, part1, moves, rules, want)
             dealt1, coop = dealt1 + d, coop + asked
             score1 += d * weights[1, GIVEN_SHORT if moves.short[k1] else GIVEN_LONG]
             if reacting[BEGUN] == when:
-                state[FIELDS:] = reacting
+                state[FIELDS : 2 * FIELDS] = reacting
         elif n0 != NOTHING:
             d, asked = land(state, 0, n0, part0, moves, rules, want)
             dealt0, coop = dealt0 + d, coop + asked
@@ -466,11 +468,14 @@ def expand(game, state, children):
         child = children.state[count]
         for f in range(STATE):
             child[f] = state[f]
+        child[FRESH] = 0.0
         begin(child, p, stretches[n], time, x, z, yaw, moves)
         children.action[count] = stretches[n]
         children.comp[count], children.coop[count] = edge(
             child, p, stretches[n], opposing, moves, rules, want
         )
+        if state[FRESH] != 0.0:
+            children.comp[count] -= want.tired[stretches[n]]
         count += 1
     return count, stretches.shape[0], p
 
