@@ -276,10 +276,10 @@ def test_bodies_on_one_spot_are_carried_apart_slowly(library: Library):
     scene = LiveScene(settings, library, seed=0)
     for _ in range(int(4 * scene.fps)):
         before = scene.cast.anchor.copy()
-        place, room = scene.cast.root_position, scene._room
-        near.fill_hash(place, scene._hash)
+        place, room = scene.cast.root_position, scene.floor.room
+        near.fill_hash(place, scene.floor.grid)
         for k in range(3):
-            crowd.push_one(k, place, room.closest, room.most, scene._hash, room.push[k])
+            crowd.push_one(k, place, room.closest, room.most, scene.floor.grid, room.push[k])
         for k in range(3):
             crowd.carry_away(k, room.push, scene.cast.anchor, scene.cast.foot_offset)
         moved = np.hypot(*(scene.cast.anchor - before)[:, :2].T)

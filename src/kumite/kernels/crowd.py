@@ -21,7 +21,7 @@ from kumite.kernels.blow import (
     swept_contact,
 )
 from kumite.kernels.character import begin, planar_point, show_one, turned
-from kumite.kernels.jit import kernel, parallel_kernel
+from kumite.kernels.jit import kernel, parallel_kernel, plugged
 from kumite.kernels.look_ahead import look_ahead, look_further
 from kumite.kernels.near import fill_hash, nearest
 from kumite.kernels.policy import carry, wrapped
@@ -372,6 +372,37 @@ def start_blows(played, grid, shapes, blows):
         throw_one(k, played.blow_of_frame, played.frame[k], blows)
 
 
+def _advance(dt, played, grid, opponent, room, shapes, blows):
+    """One frame of all along the actions begun: all move on, bodies are kept apart, blows tested.
+
+    Returns how many blows began or landed.
+
+    grid holds where all stand afterwards.
+    """
+    place = played.poses.root_position
+    for k in prange(played.frame.shape[0]):
+        played.frame[k] += 1
+        show_one(k, dt, played)
+    fill_hash(place, grid)
+    for k in prange(played.frame.shape[0]):
+        push_one(k, place, room.closest, room.most, grid, room.push[k])
+    for k in prange(played.frame.shape[0]):
+        carry_away(k, room.push, played.anchor, played.offsets.foot)
+    count = 0
+    for k in prange(played.frame.shape[0]):
+        measure_one(k, played.poses.position, played.poses.world_wxyz, shapes, blows)
+        begun, blows.flying[k] = throw_one(k, played.blow_of_frame, played.frame[k], blows)
+        count += begun
+    for k in prange(played.frame.shape[0]):
+        if blows.flying[k]:
+            count += hit_one(k, opponent[k], shapes, blows)
+    return count
+
+
+advance = kernel(_advance)
+advance_many = parallel_kernel(_advance)  # on all cores
+
+
 def _step(
     who,
     states,
@@ -388,10 +419,9 @@ def _step(
     shapes,
     blows,
 ):
-    """One frame of all characters: who [W], in states [W], choose, all at once; everyone moves on,
-    bodies are kept apart, blows are tested. How many blows began or landed.
+    """:func:`advance` after who [W], in states [W], have chosen, all at once: one call a frame.
 
-    grid must hold where all stand, and does so again afterwards.
+    grid must hold where all stand.
     """
     place = played.poses.root_position
     for w in prange(who.shape[0]):
@@ -399,24 +429,8 @@ def _step(
             who[w], states[w], place, grid, actors, minds, moves, behaviours, horizon, choices
         )
     begin(who, choices.stretch, played)
-    for k in prange(played.frame.shape[0]):
-        played.frame[k] += 1
-        show_one(k, dt, played)
-    fill_hash(place, grid)
-    for k in prange(played.frame.shape[0]):
-        push_one(k, place, room.closest, room.most, grid, room.push[k])
-    for k in prange(played.frame.shape[0]):
-        carry_away(k, room.push, played.anchor, played.offsets.foot)
-    count = 0
-    for k in prange(played.frame.shape[0]):
-        measure_one(k, played.poses.position, played.poses.world_wxyz, shapes, blows)
-        begun, blows.flying[k] = throw_one(k, played.blow_of_frame, played.frame[k], blows)
-        count += begun
-    for k in prange(played.frame.shape[0]):
-        if blows.flying[k]:
-            count += hit_one(k, actors.opponent[k], shapes, blows)
-    return count
+    return advance(dt, played, grid, actors.opponent, room, shapes, blows)
 
 
-step = kernel(_step)
-step_many = parallel_kernel(_step)  # on all cores
+step = plugged(_step, advance=advance)
+step_many = plugged(_step, parallel=True, advance=advance_many)  # on all cores

@@ -224,11 +224,11 @@ def contact(state, p, since, until, moves, rules):
 
 @kernel
 def land(state, p, n, part, moves, rules, want):
-    """Tip n of player p meets a part: damage D (Eq. 6), and the reaction's A⁺ or A⁻ if there is one.
+    """Tip n of player p meets a part: damage D (Eq. 6), and what its reaction is asked for.
 
     The victim's action is cut short there.
     """
-    a, v = p * FIELDS, (1 - p) * FIELDS
+    a = p * FIELDS
     state[a + LANDED] = moves.tip_blow[n]
     damage = moves.tip_speed[n] * rules.vulnerable[part]
     if damage == 0.0:
@@ -247,7 +247,7 @@ def land(state, p, n, part, moves, rules, want):
 
 @kernel
 def play_on(state, since, until, both, moves, rules, want):
-    """What happens after ``since``: until someone chooses, or, with ``both``, until both have ended.
+    """What happens after ``since`` until someone chooses, or, with ``both``, until both have ended.
 
     Returns what player 0 and player 1 dealt, weighted by their own w⁺, what they dealt unweighted
     (D of Eq. 6), and coop of reactions. ``state`` is changed by reactions.
@@ -488,9 +488,7 @@ def leaves(game, children, count):
     for n in range(count):
         state = children.state[n]
         since = min(state[END], state[FIELDS + END])
-        score0, score1, dealt0, dealt1, coop = play_on(
-            state, since, np.inf, True, moves, rules, want
-        )
+        score0, _, dealt0, dealt1, coop = play_on(state, since, np.inf, True, moves, rules, want)
         if dealt0 > 0.0 or dealt1 > 0.0:
             children.comp[n] += score0 - weights[0, TAKEN] * dealt1
         children.coop[n] += coop

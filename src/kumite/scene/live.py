@@ -24,21 +24,17 @@ from kumite.control import (
 from kumite.errors import KumiteError, unknown
 from kumite.graph import Library
 from kumite.kernels import crowd as kernels
-from kumite.kernels import near
-from kumite.kernels.blow import NO_BLOW, NO_HIT, NO_LIMB, NOBODY, swept_contact
+from kumite.kernels.blow import NO_BLOW, NOBODY, swept_contact
 from kumite.kernels.character import MANY
 from kumite.rotation import rotate
+from kumite.scene.floor import Floor, Landing
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.pairs import pair_up
 from kumite.scene.recording import Event
 from kumite.scene.settings import NEAREST, SceneSettings
 from kumite.scene.stage import SceneObject
-from kumite.synthesis import Cast
 
-TARGET_PARTS = ("head", "neck", "chest", "waist", *ARMS)
 AIM = "head"
-CLOSEST = 0.40  # m between two pelvises under which bodies are pushed apart
-PUSH_SPEED = 0.5  # m/s, at most, of that push: slow enough not to be seen as a jump
 ANTICIPATION = 0.4  # s of the other's motion that a fighter foresees; then it takes it to stand
 RECOIL = 0.018  # m that a struck segment gives way per m/s of the blow
 SWING = 0.35  # m/s that a struck target gains per m/s of the blow
@@ -115,7 +111,6 @@ class LiveScene:
             tuple(trained(library, b, cache, progress=progress) for b in more),
         )
         self.body = lay_body(self.skeleton)
-        self._shapes = self._lay_shapes()
         position, world = library.clips.world
         head = self.body.part(AIM)
         middle = 0.5 * (self.body.start[head] + self.body.end[head])
@@ -164,32 +159,6 @@ class LiveScene:
             for n in names
         ]
 
-    def _lay_shapes(self) -> kernels.Shapes:
-        """Where blows land on a body, and with what limbs strike."""
-        body, skeleton = self.body, self.skeleton
-        joints, offsets, radii = [], [], []
-        for limb in LIMBS:
-            joint, offset = skeleton.tip(limb)
-            radius = float(body.radius_end[body.part(limb)])
-            length = float(np.linalg.norm(offset))
-            joints.append(joint)
-            # The sphere's front is the limb's tip.
-            offsets.append(offset * (1.0 - min(radius / max(length, 1e-6), 1.0)))
-            radii.append(radius)
-        return kernels.Shapes(
-            body.joint.astype(np.int64),
-            body.start,
-            body.end,
-            body.radius_start,
-            body.radius_end,
-            np.array([p in TARGET_PARTS for p in body.parts]),
-            np.array([p in ARMS for p in body.parts]),
-            np.array([LIMBS.index(p) if p in LIMBS else NO_LIMB for p in body.parts]),
-            np.array(joints),
-            np.array(offsets),
-            np.array(radii),
-        )
-
     def reset(self, seed: int) -> None:
         """Start again from the beginning, with a seed."""
         self.seed = int(seed)
@@ -204,14 +173,15 @@ class LiveScene:
         ]
         self._home = [thing.position.copy() for thing in self.objects]
         self._swing = [np.zeros(3) for _ in self.objects]
-        self.cast = cast = Cast(self.library, count)
+        self.floor = Floor(self.library, count)
+        self.cast = cast = self.floor.cast
         # Everyone starts in a state with many ways out: the usual guard, not the end of a blow.
         ways = np.diff(self.library.table.action_start)
         common = np.flatnonzero(ways >= np.quantile(ways, 0.75))
         for k, c in enumerate(self.settings.characters):
             facing = np.array([*c.position, np.radians(c.yaw_deg)])
             cast.place(k, int(rng.choice(common)), facing)
-        cast.show(0.0)
+        self.floor.start()
         clips = self.library.clips
         yaws = np.radians([o.yaw_deg for o in self.settings.object])
         self._things = np.zeros((len(self.objects), 4))
@@ -220,7 +190,7 @@ class LiveScene:
             cast.frame,
             cast.stop,
             cast.anchor,
-            np.full(count, NOBODY, dtype=np.int64),
+            self.floor.opponent,
             np.full(count, NOBODY, dtype=np.int64),
             self._things,
             self._head,
@@ -228,26 +198,6 @@ class LiveScene:
             clips.facing,
         )
         self._aim()
-        buckets = 1 << max(3, int(2 * count - 1).bit_length())
-        self._hash = near.Hash(
-            np.zeros(buckets + 1, dtype=np.int32),
-            np.zeros(count, dtype=np.int32),
-            np.zeros((count, 2), dtype=np.int32),
-        )
-        parts, limbs = len(self.body), len(LIMBS)
-        self._room = kernels.Room(CLOSEST, PUSH_SPEED / self.fps, np.zeros((count, 2)))
-        self._blows = kernels.Blows(
-            np.zeros((2, count, limbs, 3)),
-            np.zeros((2, count, parts, 3)),
-            np.zeros((2, count, parts, 3)),
-            np.full((count, limbs), NO_BLOW, dtype=np.int32),
-            np.full((count, limbs), NO_BLOW, dtype=np.int32),
-            np.zeros((count, limbs), dtype=bool),
-            np.zeros(count, dtype=bool),
-            np.full((count, limbs), NO_HIT, dtype=np.int64),
-            np.zeros((count, limbs)),
-        )
-        kernels.start_blows(cast.played, self._hash, self._shapes, self._blows)
 
     def _aim(self) -> None:
         """Who aims at whom: as the scene says, or at the nearest who is free (or else at all)."""
@@ -293,7 +243,7 @@ class LiveScene:
             self._aim()
         for o, thing in enumerate(self.objects):
             self._things[o, :3] = thing.position
-        cast, blows = self.cast, self._blows
+        cast, floor = self.cast, self.floor
         who = cast.waiting
         states = np.searchsorted(self.library.table.state_frame, cast.frame[who])
         self.fighters.note(who)
@@ -304,23 +254,23 @@ class LiveScene:
             1.0 / self.fps,
             self._horizon,
             cast.played,
-            self._hash,
+            floor.grid,
             self._actors,
             self.fighters.minds,
             self.skill.moves,
             self.skill.behaviours,
             self.fighters.choices,
-            self._room,
-            self._shapes,
-            blows,
+            floor.room,
+            floor.shapes,
+            floor.blows,
         )
         self._note_decisions(who, states)
         self.frame += 1
         if happened:
-            for k, s in np.argwhere(blows.begun).tolist():
-                self._event("strike", k, limb=LIMBS[s], blow=int(blows.thrown[k, s]))
-            for k, s in np.argwhere(blows.part != NO_HIT).tolist():
-                self._land(k, s)
+            for k, s, blow in floor.thrown:
+                self._event("strike", k, limb=LIMBS[s], blow=blow)
+            for landing in floor.landings:
+                self._land(landing)
         if self.objects:
             self._test_objects()
             self._swing_objects()
@@ -340,18 +290,21 @@ class LiveScene:
                 jump=bool(jump[k]),
             )
 
-    def _land(self, k: int, s: int) -> None:
-        """Limb s of character k has hit its opponent: say so, and let the struck segment give."""
-        blows = self._blows
-        victim, struck = int(self._actors.opponent[k]), int(blows.part[k, s])
-        t = float(blows.when[k, s])
-        before, now = blows.tip[:, k, s]
-        place = before + t * (now - before)
-        middle_before, middle = 0.5 * (blows.a[:, victim, struck] + blows.b[:, victim, struck])
-        velocity = ((now - before) - (middle - middle_before)) * self.fps
-        blows.landed[k, s] = blows.thrown[k, s]
-        self._hit(k, s, self.names[victim], self.body.parts[struck], velocity, place, t)
-        self.cast.strike(victim, int(self._shapes.joint[struck]), place, RECOIL * velocity)
+    def _land(self, landing: Landing) -> None:
+        """A blow has hit an opponent: say so, and let the struck segment give."""
+        body = self.body
+        victim, part = self.names[landing.victim], body.parts[landing.part]
+        self._hit(
+            landing.who,
+            landing.limb,
+            victim,
+            part,
+            landing.velocity,
+            landing.place,
+            landing.share,
+        )
+        joint = int(body.joint[landing.part])
+        self.cast.strike(landing.victim, joint, landing.place, RECOIL * landing.velocity)
 
     def _hit(
         self,
@@ -373,11 +326,11 @@ class LiveScene:
             place=[round(float(x), 4) for x in place],
             time=round((self.frame - 1 + t) / self.fps, 4),
             blocked=part in ARMS and part != victim,
-            blow=int(self._blows.thrown[k, s]),
+            blow=int(self.floor.blows.thrown[k, s]),
         )
 
     def _test_objects(self) -> None:
-        blows = self._blows
+        blows = self.floor.blows
         for k in np.flatnonzero(self._actors.thing != NOBODY).tolist():
             o = int(self._actors.thing[k])
             thing = self.objects[o]
@@ -386,7 +339,7 @@ class LiveScene:
                 if blows.thrown[k, s] in (NO_BLOW, blows.landed[k, s]):
                     continue
                 p0, p1 = blows.tip[:, k, s]
-                fist = self._shapes.tip_radius[s]
+                fist = self.floor.shapes.tip_radius[s]
                 t = swept_contact(p0, p1, at, at, at, at, radius, radius, fist)
                 if t < 0:
                     continue
