@@ -30,7 +30,7 @@ from kumite.scene import (
     record,
     save_recording,
 )
-from kumite.scene.live import PUSH_SPEED
+from kumite.scene.floor import PUSH_SPEED
 from kumite.scene.metrics import foot_skate, source_skate
 from tests import reference, toys
 

@@ -93,9 +93,8 @@ class Want(NamedTuple):
     tired: np.ndarray  # [L] what it costs the searcher to begin a stretch now: it used it lately
 
 
-Game = NamedTuple(  # flat, as the search hands it on
-    "Game", [(name, t) for part in (Moves, Rules, Want) for name, t in part.__annotations__.items()]
-)
+_FIELDS = {n: t for part in (Moves, Rules, Want) for n, t in part.__annotations__.items()}
+Game = NamedTuple("Game", list(_FIELDS.items()))  # type: ignore[misc]  # flat, for the search
 
 
 @kernel
