@@ -51,7 +51,8 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
     """A scene ready to run: library read or performed, policies trained or found."""
     from kumite.control import cache_folder
     from kumite.graph import builtin_library, load_library
-    from kumite.scene import LiveScene
+    from kumite.scene import BoutScene, LiveScene
+    from kumite.scene.fighters import BoutSettings
 
     cache = cache_folder(library)
     with progress() as bars:
@@ -60,8 +61,12 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
             stages("reading the library")
             found = load_library(library)
         else:
-            found = builtin_library(cache, progress=stages)
+            bout = settings.bout or BoutSettings()
+            level = "actions" if settings.fighter else "frames"
+            found = builtin_library(cache, progress=stages, style=bout.library, level=level)
         stages("preparing the scene")
+        if settings.fighter:
+            return BoutScene(settings, found, seed=seed)
         return LiveScene(settings, found, seed=seed, cache=cache, progress=Training(bars))
 
 
@@ -82,7 +87,7 @@ def run(
     from kumite.scene import measure, record
 
     settings = _settings(scene, count)  # before any long work: what is wrong is said at once
-    names = [c.name for c in settings.character]
+    names = [c.name for c in (*settings.character, *settings.fighter)]
     _check_outputs(output or [], [*names, *(["the crowd"] if settings.crowd else [])])
     live = _live_scene(settings, library, seed)
     with progress() as bars:

@@ -1,5 +1,6 @@
 """Scenes: characters, objects and events; live, recorded and measured."""
 
+from kumite.scene.bout import BoutScene
 from kumite.scene.live import LiveScene
 from kumite.scene.metrics import CharacterMetrics, Metrics, measure
 from kumite.scene.recording import Event, Recording, load_recording, save_recording
@@ -8,6 +9,7 @@ from kumite.scene.settings import SceneSettings, builtin_scenes, load_scene, wit
 from kumite.scene.stage import Playback, SceneObject, Stage
 
 __all__ = [
+    "BoutScene",
     "CharacterMetrics",
     "Event",
     "LiveScene",

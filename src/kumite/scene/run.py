@@ -7,17 +7,19 @@ from collections.abc import Callable
 import numpy as np
 
 from kumite.errors import KumiteError
+from kumite.scene.bout import BoutScene
 from kumite.scene.live import LiveScene
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.metrics import source_skate
 from kumite.scene.recording import Event, Recording
-from kumite.scene.settings import NEAREST
 
 MOST_BYTES = 16e9  # of one recording
 
 
 def record(
-    scene: LiveScene, seconds: float, progress: Callable[[float], None] = lambda share: None
+    scene: LiveScene | BoutScene,
+    seconds: float,
+    progress: Callable[[float], None] = lambda share: None,
 ) -> Recording:
     """Step a scene for a time [s] and keep every frame and event. progress is told 0..1.
 
@@ -69,9 +71,7 @@ def record(
             "library": scene.library.digest,
             "source_skate_m_s": source_skate(scene.library),
             "object_radius": {thing.name: thing.radius for thing in scene.objects},
-            "aims_at": {
-                c.name: c.aims_at for c in scene.settings.characters if c.aims_at != NEAREST
-            },
+            "aims_at": scene.settings.aims,
             "scene": scene.settings.model_dump(mode="json"),
         },
     )

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from kumite import toml
 from kumite.errors import KumiteError
+from kumite.scene.fighters import BoutSettings, FighterSettings
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 FARTHEST = 1000.0  # m: recordings keep single precision
@@ -120,6 +121,8 @@ class SceneSettings(_Settings):
     about: str = ""
     character: tuple[CharacterSettings, ...] = ()
     crowd: CrowdSettings | None = None
+    fighter: tuple[FighterSettings, ...] = ()  # who fight by game tree
+    bout: BoutSettings | None = None  # what their fight goes by
     object: tuple[ObjectSettings, ...] = ()
 
     @cached_property
@@ -129,8 +132,14 @@ class SceneSettings(_Settings):
 
     @model_validator(mode="after")
     def _names_fit(self) -> SceneSettings:
+        if self.fighter:
+            if self.character or self.crowd or self.object:
+                raise ValueError("[[fighter]]s fight among themselves; expected nobody else")
+            return self._fit_fighters()
         if not self.character and self.crowd is None:
-            raise ValueError("nobody is in it; expected a [[character]] or a [crowd]")
+            raise ValueError("nobody is in it; expected a [[character]], a [crowd] or [[fighter]]s")
+        if self.bout is not None:
+            raise ValueError("[bout] is of [[fighter]]s; there are none")
         names = [c.name for c in self.characters] + [o.name for o in self.object]
         twice = sorted(n for n, times in Counter(names).items() if times > 1)
         if twice:
@@ -144,6 +153,30 @@ class SceneSettings(_Settings):
                     f"{c.name} aims at {c.aims_at!r}; expected another name of the scene ({others})"
                 )
         return self
+
+    def _fit_fighters(self) -> SceneSettings:
+        names = self.names
+        twice = sorted({n for n in names if names.count(n) > 1})
+        if twice:
+            raise ValueError(f"names used twice: {', '.join(twice)}")
+        for f in self.fighter:
+            if f.against == f.name or f.against not in names:
+                others = ", ".join(n for n in names if n != f.name) or "nobody else"
+                raise ValueError(
+                    f"{f.name} is against {f.against!r}; expected another fighter ({others})"
+                )
+        return self
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all that move by themselves."""
+        return tuple(c.name for c in (*self.characters, *self.fighter))
+
+    @property
+    def aims(self) -> dict[str, str]:
+        """Whom each aims at that always aims at the same."""
+        found = {c.name: c.aims_at for c in self.characters if c.aims_at != NEAREST}
+        return found | {f.name: f.against for f in self.fighter}
 
 
 def with_count(settings: SceneSettings, count: int) -> SceneSettings:
