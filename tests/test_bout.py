@@ -1,0 +1,162 @@
+"""Fights by game tree: they are what their settings say, and can be told to be others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kumite.control.game_tree import GameTree, Player
+from kumite.errors import KumiteError
+from kumite.graph import Library, builtin_library
+from kumite.scene import BoutScene, SceneSettings, load_scene, measure, record
+
+
+@pytest.fixture(scope="module")
+def actions() -> Library:
+    """The built-in boxer's actions."""
+    return builtin_library(None, level="actions")
+
+
+def _fight(actions: Library, **changes) -> BoutScene:
+    """Boxing with one or the other fighter changed: red={…}, blue={…}."""
+    settings = load_scene("boxing").model_dump(exclude_none=True)
+    for fighter in settings["fighter"]:
+        fighter.update(changes.get(fighter["name"], {}))
+    return BoutScene(SceneSettings.model_validate(settings), actions, seed=changes.get("seed", 0))
+
+
+def _run(scene: BoutScene, seconds: float) -> np.ndarray:
+    """Distances [frames] between the first two while it runs."""
+    out = []
+    for _ in range(round(seconds * scene.fps)):
+        scene.step()
+        out.append(np.hypot(*(scene.root_position[0] - scene.root_position[1])[[0, 2]]))
+    return np.array(out)
+
+
+def _landed(scene: BoutScene, name: str) -> int:
+    return sum(
+        e.kind == "hit" and e.character == name and not e.data["blocked"] for e in scene.events
+    )
+
+
+def test_two_fight_and_the_log_says_what_was_looked_at(actions: Library):
+    scene = _fight(actions)
+    recording = record(scene, 15.0)
+    kinds = {e.kind for e in recording.events}
+    assert {"decision", "strike", "hit", "reaction"} <= kinds
+    for e in recording.events:
+        if e.kind == "decision":
+            assert e.data["considered"] >= e.data["nodes"] > 1 and 0 <= e.data["pruned"] < 1
+            assert scene.tree.kinds[e.data["stretch"]] != "reaction"  # nobody chooses to be struck
+    found = measure(recording)
+    assert found.min_separation_m is not None and found.min_separation_m > 0.3
+    for c in found.characters:
+        assert c.thrown >= c.landed and c.facing_share is not None and c.facing_share > 0.6
+        assert c.skate_m_s < 0.02 and c.join_jump_m_s < 0.6
+
+
+def test_a_blow_that_lands_brings_its_reaction_and_one_that_is_blocked_does_not(actions: Library):
+    scene = _fight(actions, seed=3)
+    _run(scene, 15.0)
+    hits = [e for e in scene.events if e.kind == "hit"]
+    reactions = {(e.frame, e.character) for e in scene.events if e.kind == "reaction"}
+    assert any(not e.data["blocked"] for e in hits)
+    struck = {(e.frame, e.data["victim"]) for e in hits if not e.data["blocked"]}
+    assert reactions == struck
+
+
+def test_the_same_seed_gives_the_same_fight(actions: Library):
+    def fight(seed: int) -> BoutScene:
+        scene = _fight(actions, seed=seed)
+        _run(scene, 6.0)
+        return scene
+
+    a, b, c = fight(1), fight(1), fight(2)
+    assert a.wxyz.tobytes() == b.wxyz.tobytes() and a.events == b.events
+    assert a.wxyz.tobytes() != c.wxyz.tobytes()
+    a.reset(2)
+    _run(a, 6.0)
+    assert a.wxyz.tobytes() == c.wxyz.tobytes() and a.events == c.events
+
+
+def test_infighters_are_nearer_than_those_who_keep_away(actions: Library):
+    near = _run(_fight(actions, red={"style": "infighter"}, blue={"style": "infighter"}), 12.0)
+    far = _run(_fight(actions, red={"style": "outboxer"}), 12.0)
+    assert near[120:].mean() + 0.4 < far[120:].mean()
+
+
+@pytest.mark.slow
+def test_who_looks_further_ahead_lands_more(actions: Library):
+    wins = 0
+    for seed in range(3):
+        scene = _fight(actions, red={"depth": 3}, blue={"depth": 1}, seed=seed)
+        _run(scene, 30.0)
+        wins += _landed(scene, "red") > _landed(scene, "blue")
+    assert wins >= 2
+
+
+def test_weights_and_depth_count_from_the_next_decision(actions: Library):
+    scene = _fight(actions, red={"style": "infighter"}, blue={"style": "infighter"})
+    controls = {c.name: c for c in scene.controls}
+    _run(scene, 6.0)
+    for name in ("red", "blue"):
+        controls[f"{name}: preferred_distance"].set(3.0)
+        for field in ("given_short", "given_long", "taken"):
+            controls[f"{name}: {field}"].set(0.0)
+        controls[f"{name}: depth"].set(2)
+    assert scene.players[0].depth == 2 and scene.players[1].style.preferred_distance == 3.0
+    assert _run(scene, 8.0)[-60:].mean() > 2.0
+
+
+def test_a_pair_follows_check_points_and_says_what_it_missed(actions: Library):
+    path = {
+        "path": {"shape": "line", "centre": (0, 0), "end": (3.0, 0), "points": 4, "radius": 0.6},
+        "style": {"preset": "boxer_path", "place": 1e4},
+        "depth": 2,
+    }
+    far = {"style": {"preset": "boxer_path", "place": 1e4}, "depth": 2}
+    far["point"] = [{"place": (40.0, 0.0), "time": 5.0}]
+    scene = _fight(actions, red=path, blue=far)
+    _run(scene, 25.0)
+    reached = [e.data["point"] for e in scene.events if e.kind == "check point"]
+    assert reached == list(range(len(reached))) and len(reached) >= 2
+    (missed,) = [e for e in scene.events if e.kind == "missed"]
+    assert missed.character == "blue" and missed.data["due"] == 5.0 and missed.data["by"] > 20.0
+
+
+def test_wrong_fights_are_refused(actions: Library, library: Library):
+    with pytest.raises(KumiteError, match="one of frames; expected one of whole actions"):
+        BoutScene(load_scene("boxing"), library)
+    with pytest.raises(KumiteError, match="no action is called 'flying_kick'"):
+        _fight(actions, red={"wanted": ["flying_kick"]})
+    with pytest.raises(KumiteError, match="A⁻ holds every action"):
+        _fight(actions, red={"unwanted": ["attack", "defence", "transition", "idle"]})
+    with pytest.raises(ValueError, match=r"style 'infigter'.*infighter"):
+        _fight(actions, red={"style": "infigter"})
+    with pytest.raises(ValueError, match="weight of a style 'strenght'"):
+        _fight(actions, red={"style": {"strenght": 2.0}})
+    with pytest.raises(ValueError, match="red is against 'green'"):
+        _fight(actions, red={"against": "green"})
+    with pytest.raises(KumiteError, match="expected 1 to"):
+        Player(depth=0)
+
+
+def test_decisions_are_those_of_the_whole_tree(actions: Library):
+    """What bounds skip changes no decision."""
+    tree = GameTree(actions)
+    scene = _fight(actions, seed=5)
+    for _ in range(6):
+        _run(scene, 1.0)
+        k = int(scene.cast.waiting[0]) if len(scene.cast.waiting) else 0
+        state = tree.state(
+            (int(scene.stretch[k]), int(scene.stretch[1 - k])),
+            (-60.0, -30.0),
+            (0.0, 20.0),
+            (scene.cast.facing[k], scene.cast.facing[1 - k]),
+            0.0,
+        )
+        players = (Player(depth=2), Player(depth=2))
+        some, whole = (tree.decide(state, players, bounds=b) for b in (True, False))
+        assert (some.stretch, some.comp) == (whole.stretch, pytest.approx(whole.comp))
+        assert some.nodes.sum() <= whole.nodes.sum()
