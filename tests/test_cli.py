@@ -16,6 +16,7 @@ from kumite import cli
 from kumite.clip import forward_kinematics
 from kumite.export.bvh import write_bvh
 from kumite.graph import Library, save_library
+from kumite.graph.library import VERSION
 from kumite.mocap import load
 from kumite.performer import STYLES, perform
 from tests import toys
@@ -391,7 +392,7 @@ def test_a_damaged_or_other_version_of_a_library(kumite, built: Path, tmp_path: 
     status, _, err = kumite("run", "sparring", "-l", "cut.kumite")
     assert status == 2 and "cut.kumite: damaged" in err
     (tmp_path / "new.kumite").write_bytes(
-        whole.replace(b'\\"version\\": 2', b'\\"version\\": 9', 1)
+        whole.replace(b'\\"version\\": %d' % VERSION, b'\\"version\\": 9', 1)
     )
     status, _, err = kumite("run", "sparring", "-l", "new.kumite")
     assert status == 2 and "version 9" in err

@@ -15,6 +15,7 @@ from kumite.clip import Clip, concatenate
 from kumite.errors import KumiteError
 from kumite.graph import Library, Transitions, build_library, fold, load_library, save_library
 from kumite.graph import strongest_component as component
+from kumite.graph.library import VERSION
 from kumite.rotation import planar_apply, planar_compose, planar_inverse
 from tests import reference, toys
 
@@ -147,10 +148,10 @@ def test_a_library_whose_numbers_point_nowhere_is_damaged(
 ):
     """Kernels follow them without looking: unchecked, they end the process."""
     save_library(tmp_path / "a.kumite", library)
-    header, arrays = files.load(tmp_path / "a.kumite", "library", 2)
+    header, arrays = files.load(tmp_path / "a.kumite", "library", VERSION)
     wrong = arrays[name].copy()
     wrong[len(wrong) // 2] = value
-    files.save(tmp_path / "b.kumite", "library", 2, header, {**arrays, name: wrong})
+    files.save(tmp_path / "b.kumite", "library", VERSION, header, {**arrays, name: wrong})
     with pytest.raises(KumiteError, match=f"b.kumite: damaged library .*{message}"):
         load_library(tmp_path / "b.kumite")
 

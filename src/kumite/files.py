@@ -97,6 +97,19 @@ def save(
         temporary.write_bytes(save_tensors(tensors, metadata=meta))
 
 
+def kind_of(path: Path | str) -> str | None:
+    """What a file that :func:`save` wrote holds; None of any other file, and of none."""
+    try:
+        with Path(path).open("rb") as file:
+            size = int.from_bytes(file.read(8), "little")
+            if size > os.fstat(file.fileno()).st_size:
+                return None
+            meta = json.loads(json.loads(file.read(size))["__metadata__"][META_KEY])
+        return str(meta["kind"])
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+
+
 def load(path: Path | str, kind: str, version: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """The header and arrays of a file that :func:`save` wrote.
 

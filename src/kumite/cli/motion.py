@@ -9,12 +9,17 @@ import typer
 from rich.table import Table
 
 from kumite.cli.app import JsonOption, Stages, app, err, out, print_json, progress
-from kumite.errors import KumiteError
+from kumite.cli.library import is_library, library_lines, library_values, show_library
+from kumite.errors import KumiteError, unknown
 
 SHORTEST_ACTION = 0.25  # s; below it a graph is too fine to fight by
 
 Source = Annotated[
     list[str], typer.Argument(help="Mocap: a folder, a glob, .bvh files, .amc files.")
+]
+SourceOrLibrary = Annotated[
+    list[str],
+    typer.Argument(help="Mocap: a folder, a glob, .bvh files, .amc files; or one library."),
 ]
 ScaleOption = Annotated[
     float | None, typer.Option(help="Length of the files' unit [m] (else inferred).")
@@ -61,7 +66,7 @@ def _load_clips(source: list[str], fps, file_fps, metres_per_unit, up_axis, grou
 
 @app.command()
 def info(
-    source: Source,
+    source: SourceOrLibrary,
     plot: Annotated[
         Path | None, typer.Option(help="Draw where blows land, from front, top and side.")
     ] = None,
@@ -73,10 +78,22 @@ def info(
     ground: GroundOption = None,
     role: RoleOption = None,
 ) -> None:
-    """What is in motion capture files: rates, lengths, blows, and all that was inferred."""
+    """What is in motion capture files (rates, blows, all that was inferred), or in a library."""
     from kumite.annotate import Strikes, find_strikes
     from kumite.clip import LIMBS, check, concatenate
 
+    if len(source) == 1 and is_library(source[0]):
+        reading = {
+            "--fps": fps,
+            "--file-fps": file_fps,
+            "--metres-per-unit": metres_per_unit,
+            "--up-axis": up_axis,
+            "--ground": ground,
+            "--role": role,
+        }
+        given = [name for name, value in reading.items() if value is not None]
+        show_library(source[0], plot, as_json, given)
+        return
     loaded = _load_clips(source, fps, file_fps, metres_per_unit, up_axis, ground, role)
     hits: dict[str, dict[str, int]] = {}
     every: list[Strikes] = []
@@ -142,12 +159,28 @@ def info(
 def build(
     source: Source,
     output: Annotated[Path, typer.Option("--output", "-o", help="The library file to write.")],
+    level: Annotated[
+        str, typer.Option(help="A graph of frames, or of whole actions (kumite segment).")
+    ] = "frames",
     event: Annotated[
-        str, typer.Option(help="Join where a foot lifts off: left, right, both; or none: anywhere.")
-    ] = "left",
+        str | None,
+        typer.Option(
+            help="Frames: join where a foot lifts off: left (the default), right, both; "
+            "or none: anywhere."
+        ),
+    ] = None,
     per_second: Annotated[
-        float, typer.Option(help="Wanted transitions per second of capture.")
-    ] = 52.0,
+        float | None,
+        typer.Option(help="Frames: wanted transitions per second of capture (default 52)."),
+    ] = None,
+    actions: Annotated[
+        Path | None,
+        typer.Option(help="Actions: the text file of 'kumite segment' (default: as found)."),
+    ] = None,
+    alike: Annotated[
+        float | None,
+        typer.Option(help="Actions: postures nearer than that are one node [rad] (default 1.2)."),
+    ] = None,
     as_json: JsonOption = False,
     fps: FpsOption = None,
     file_fps: FileFpsOption = None,
@@ -158,40 +191,68 @@ def build(
 ) -> None:
     """Build a library: clips, contacts, effective hits and the motion graph, in one file."""
     from kumite.files import refuse_unwritable
-    from kumite.graph import build_library, save_library
+    from kumite.graph import save_library
 
+    _refuse_of_another_level(
+        level,
+        {
+            "frames": {"--event": event, "--per-second": per_second},
+            "actions": {"--actions": actions, "--alike": alike},
+        },
+    )
     refuse_unwritable(output)  # before the work, not after
     loaded = _load_clips(source, fps, file_fps, metres_per_unit, up_axis, ground, role)
     with progress() as bars:
-        library = build_library(
-            loaded.clip_set(), event=event, per_second=per_second, progress=Stages(bars)
-        )
+        library = _built(loaded.clip_set(), level, event, per_second, actions, alike, Stages(bars))
     save_library(output, library)
-    r = library.report
     if as_json:
-        print_json({**r, "output": str(output), "clips": len(library.clips.names)})
+        print_json({**library_values(library), "output": str(output)})
         return
     for line in loaded.report():
         out.print(line, markup=False, highlight=False)
-    lines = (
-        f"{r['frames']} frames of {len(library.clips.names)} clips at {r['fps']:g} frames/s, "
-        f"{r['hits']} blows",
-        f"{r['frames_kept']} frames connected, {r['hits_kept']} blows in them: "
-        f"{r['states']} states, {r['actions']} actions of {r['mean_action_s']:.2f} s on average",
-        f"{r['transitions']} transitions of {r['candidates']} candidates "
-        f"({'anywhere' if r['event'] == 'none' else r['event'] + ' lift-off'}), "
-        f"mean join cost {r['mean_join_cost']:.2f}, accepted below {r['threshold']:.2f}",
-        f"wrote {output} ({output.stat().st_size / 1e6:.1f} MB)",
-    )
-    for line in lines:
+    wrote = f"wrote {output} ({output.stat().st_size / 1e6:.1f} MB)"
+    for line in (*library_lines(library), wrote):
         out.print(line, markup=False, highlight=False)
-    if r["mean_action_s"] < SHORTEST_ACTION:
+    mean = library.report["mean_action_s"]
+    if level == "frames" and mean < SHORTEST_ACTION:
         err.print(
-            f"warning: actions last {r['mean_action_s']:.2f} s on average; fighters look one "
+            f"warning: actions last {mean:.2f} s on average; fighters look one "
             "action ahead and will dither: join at a foot's lift-off (--event left, right or both)",
             markup=False,
             highlight=False,
         )
+
+
+def _refuse_of_another_level(level: str, options: dict[str, dict[str, Any]]) -> None:
+    """Errors: an unknown level; an option that was given and says nothing about this one."""
+    if level not in options:
+        raise unknown("level", level, options)
+    for other, given in options.items():
+        for name, value in given.items():
+            if other != level and value is not None:
+                raise KumiteError(f"{name}: of --level {other}; expected none with --level {level}")
+
+
+def _built(
+    clips: Any,
+    level: str,
+    event: str | None,
+    per_second: float | None,
+    actions: Path | None,
+    alike: float | None,
+    stages: Stages,
+) -> Any:
+    """A library of clips; None: the level's own default."""
+    from kumite.annotate import read_actions
+    from kumite.graph import build_action_library, build_library
+
+    if level == "frames":
+        frames = {"event": event, "per_second": per_second}
+        given: dict[str, Any] = {k: v for k, v in frames.items() if v is not None}
+        return build_library(clips, **given, progress=stages)
+    given = {} if alike is None else {"alike": alike}
+    mine = None if actions is None else read_actions(actions, clips)
+    return build_action_library(clips, mine, **given, progress=stages)
 
 
 @app.command()

@@ -111,9 +111,16 @@ def build_action_library(
         "mean_action_s": float(table.duration.mean() / clips.fps),
         "mean_join_cost": float(cost[cost > 0].mean()) if np.any(cost > 0) else 0.0,
         "hits": len(strikes),
+        "hits_kept": _inside(strikes.frame, first, state_frame),
         **{f"{kind}s": int(np.sum(keep & (actions.kind == k))) for k, kind in enumerate(KINDS)},
     }
     return Library(clips, contacts, strikes, table, report, actions)
+
+
+def _inside(frame: np.ndarray, first: np.ndarray, last: np.ndarray) -> int:
+    """How many frames [n] lie in stretches [L], in order, from first to last."""
+    stretch = np.searchsorted(first, frame, side="right") - 1
+    return int(np.sum((stretch >= 0) & (frame <= last[stretch])))
 
 
 def _distances(clips: ClipSet, frames: np.ndarray) -> np.ndarray:

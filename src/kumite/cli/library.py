@@ -1,0 +1,111 @@
+"""What a library holds, as lines and as plain values."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kumite.cli.app import out, print_json
+from kumite.errors import KumiteError
+
+if TYPE_CHECKING:
+    from kumite.graph import Library
+
+ENDING = ".kumite"
+
+
+def is_library(source: Path | str) -> bool:
+    """Whether a name is that of a library: by what the file says of itself, or by its ending."""
+    from kumite import files
+    from kumite.graph.library import KIND
+
+    return files.kind_of(source) == KIND or str(source).endswith(ENDING)
+
+
+def ways_on(library: Library) -> np.ndarray:
+    """How many actions are offered at each node of an action-level graph.
+
+    An action starts in one node, so what states offer is the same or has nothing in common.
+    """
+    table = library.table
+    _, one = np.unique(table.stretch[table.action_start[:-1]], return_index=True)
+    return np.diff(table.action_start)[one]
+
+
+def library_values(library: Library) -> dict[str, Any]:
+    """What a library holds, as JSON values: how it was built, then what is counted here."""
+    clips = library.clips
+    values = {
+        **library.report,
+        "level": "frames" if library.actions is None else "actions",
+        "clips": len(clips.names),
+    }
+    if library.actions is not None:
+        ways = ways_on(library)
+        values["ways_on"] = {
+            "least": int(ways.min()),
+            "most": int(ways.max()),
+            "after_an_action": round(library.table.actions / library.table.states, 4),
+        }
+    return values
+
+
+def library_lines(library: Library) -> list[str]:
+    """What a library holds, to be read."""
+    from kumite.annotate import KINDS
+
+    r, clips, table = library.report, library.clips, library.table
+    lines = [
+        f"{len(clips)} frames of {len(clips.names)} clips at {clips.fps:g} frames/s, "
+        f"{len(library.strikes)} blows"
+    ]
+    if library.actions is None:
+        mean = table.duration[table.stretch].mean() / clips.fps
+        kept = f"{r['frames_kept']} frames connected, {r['hits_kept']} blows in them: " if r else ""
+        lines.append(
+            f"{kept}{table.states} states, {table.actions} actions of {mean:.2f} s on average"
+        )
+        if r:
+            lines.append(
+                f"{r['transitions']} transitions of {r['candidates']} candidates "
+                f"({'anywhere' if r['event'] == 'none' else r['event'] + ' lift-off'}), "
+                f"mean join cost {r['mean_join_cost']:.2f}, accepted below {r['threshold']:.2f}"
+            )
+        return lines
+    kind, ways = library.actions.kind[library.action_of_stretch], ways_on(library)
+    counts = ", ".join(f"{name} {np.sum(kind == k)}" for k, name in enumerate(KINDS))
+    joined = table.join_cost[table.join_cost > 0]
+    lines += [
+        f"{len(library.actions)} actions, {len(table.first)} of them connected"
+        + (f" ({r['hits_kept']} blows)" if r else "")
+        + f", of {table.duration.mean() / clips.fps:.2f} s on average: {counts}",
+        f"{len(ways)} nodes"
+        + (f" of postures alike within {r['alike']:g} rad" if r else "")
+        + f", {ways.min()} to {ways.max()} actions offered at each, "
+        f"{table.actions / table.states:.1f} after an action on average; reactions at none",
+    ]
+    if len(joined):
+        lines.append(f"mean join cost {joined.mean():.2f} rad")
+    return lines
+
+
+def show_library(path: Path | str, plot: Path | None, as_json: bool, given: list[str]) -> None:
+    """``kumite info`` of a library. given: options that say how to read motion capture."""
+    from kumite.graph import load_library
+
+    if given:
+        raise KumiteError(f"{given[0]}: of motion capture; {path} is a library")
+    library = load_library(path)
+    if plot is not None:
+        from kumite.export.plot import plot_hits
+
+        plot_hits(plot, library.strikes, str(path))
+    if as_json:
+        print_json(library_values(library))
+        return
+    for line in library_lines(library):
+        out.print(line, markup=False, highlight=False)
+    if plot is not None:
+        out.print(f"wrote {plot}", markup=False, highlight=False)
