@@ -29,6 +29,12 @@ def library() -> Library:
 
 
 @pytest.fixture(scope="session")
+def whole() -> Library:
+    """The built-in performer's library of whole actions."""
+    return builtin_library(None, level="actions")
+
+
+@pytest.fixture(scope="session")
 def boxer(mocap: Path) -> Library:
     """The real boxer's library."""
     return build_library(mocap_files.load(mocap / "boxer").clip_set())

@@ -11,6 +11,7 @@ import typer
 from rich.table import Table
 
 from kumite.cli.app import JsonOption, Stages, Training, app, out, print_json, progress
+from kumite.cli.library import is_library
 from kumite.errors import KumiteError, unknown
 
 LibraryOption = Annotated[
@@ -221,7 +222,10 @@ def export(
 @app.command()
 def studio(
     scene: Annotated[
-        str, typer.Argument(help="A built-in scene, a .toml scene file, or a .rec file.")
+        str,
+        typer.Argument(
+            help="A built-in scene, a .toml scene file, a .rec file, or a library of actions."
+        ),
     ] = "sparring",
     library: LibraryOption = None,
     count: CountOption = None,
@@ -235,8 +239,7 @@ def studio(
     seconds: Annotated[float | None, typer.Option(help="End by itself after this time.")] = None,
     browser: Annotated[bool, typer.Option(help="Open a browser where there is one.")] = True,
 ) -> None:
-    """Watch a scene live in the browser, or play a recording."""
-    from kumite.scene import Playback, load_recording
+    """Watch a scene live in the browser, play a recording, or a library's actions one by one."""
     from kumite.studio import serve
 
     if seconds is None and os.environ.get("DEMO_SECONDS"):
@@ -246,12 +249,8 @@ def studio(
             raise KumiteError(
                 f"DEMO_SECONDS={os.environ['DEMO_SECONDS']!r}: expected a number of seconds"
             ) from None
-    if scene.endswith(".rec"):
-        stage: Any = Playback(load_recording(scene))
-    else:
-        stage = _live_scene(_settings(scene, count), library, seed)
     serve(
-        stage,
+        _stage(scene, library, count, seed),
         host=host,
         port=8080 if port is None else port,
         strict_port=port is not None,
@@ -259,6 +258,27 @@ def studio(
         seconds=seconds,
         announce=lambda line: out.print(line, markup=False, highlight=False),
     )
+
+
+def _stage(scene: str, library: Path | None, count: int | None, seed: int) -> Any:
+    """What the studio is to show."""
+    from kumite.graph import load_library
+    from kumite.scene import ActionPlayback, Playback, load_recording
+
+    if scene.endswith(".rec"):
+        return Playback(load_recording(scene))
+    if not is_library(scene):
+        return _live_scene(_settings(scene, count), library, seed)
+    for name, value in (("--library", library), ("--count", count)):
+        if value is not None:
+            raise KumiteError(f"{name}: of a scene; {scene} is a library, whose actions are played")
+    found = load_library(scene)
+    if not found.actions:
+        raise KumiteError(
+            f"{scene}: a library of frames, without actions; expected one built with "
+            "'kumite build --level actions' (or a scene, and this library as --library)"
+        )
+    return ActionPlayback(found)
 
 
 @app.command()

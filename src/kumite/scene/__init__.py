@@ -1,5 +1,6 @@
 """Scenes: characters, objects and events; live, recorded and measured."""
 
+from kumite.scene.actions import ActionPlayback, action_recording
 from kumite.scene.bout import BoutScene
 from kumite.scene.live import LiveScene
 from kumite.scene.metrics import CharacterMetrics, Metrics, measure
@@ -9,6 +10,7 @@ from kumite.scene.settings import SceneSettings, builtin_scenes, load_scene, wit
 from kumite.scene.stage import Playback, SceneObject, Stage
 
 __all__ = [
+    "ActionPlayback",
     "BoutScene",
     "CharacterMetrics",
     "Event",
@@ -19,6 +21,7 @@ __all__ = [
     "SceneObject",
     "SceneSettings",
     "Stage",
+    "action_recording",
     "builtin_scenes",
     "load_recording",
     "load_scene",

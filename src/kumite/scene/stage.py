@@ -75,10 +75,6 @@ class Playback:
     """A recording on the stage."""
 
     def __init__(self, recording: Recording) -> None:
-        self.recording = recording
-        self._all_events = sorted(recording.events, key=lambda e: e.frame)
-        self._event_frames = [e.frame for e in self._all_events]
-        self._events: list[Event] = []
         self.title = recording.scene
         self.fps = recording.fps
         self.skeleton = recording.skeleton
@@ -88,6 +84,14 @@ class Playback:
         self.objects = [
             SceneObject(n, np.zeros(3), float(radii.get(n, 0.1))) for n in recording.objects
         ]
+        self.load(recording)
+
+    def load(self, recording: Recording) -> None:
+        """Show another recording of the same characters and objects, from its start."""
+        self.recording = recording
+        self._all_events = sorted(recording.events, key=lambda e: e.frame)
+        self._event_frames = [e.frame for e in self._all_events]
+        self._events: list[Event] = []
         self.reset(self.seed)
 
     def _show(self) -> None:

@@ -8,6 +8,8 @@ from typing import Any, Protocol, runtime_checkable
 import viser
 
 from kumite.errors import KumiteError
+from kumite.scene.actions import ActionPlayback
+from kumite.studio.action_list import ActionList
 from kumite.studio.wording import EventLog, lines_html, score_html
 
 SLOWEST, FASTEST = 0.1, 4.0
@@ -47,6 +49,10 @@ class Desk(Protocol):
         """Jump within a recording."""
         ...
 
+    def choose(self, action: int) -> None:
+        """Play an action of a library."""
+        ...
+
     def set_speed(self, speed: float) -> None:
         """Seconds of the scene in a second."""
         ...
@@ -77,6 +83,7 @@ class Panel:
         frames: int | None,
         fps: float,
         controls: Sequence[Control],
+        actions: ActionPlayback | None = None,
     ) -> None:
         self._fps = fps
         self._shown: dict[str, Any] = {}
@@ -100,12 +107,12 @@ class Panel:
         )
         speed = gui.add_slider("Speed", SLOWEST, FASTEST, step=0.1, initial_value=1.0)
         speed.on_update(_safely(lambda e: desk.set_speed(e.target.value)))
-        self._timeline: viser.GuiInputHandle[float] | None = None
+        self._timeline: viser.GuiSliderHandle[float] | None = None
         if frames is None:
             number = gui.add_number("Seed", seed, min=0, step=1, hint="restarts")
             number.on_update(_safely(lambda e: desk.restart(int(e.target.value))))
         else:
-            last = max(frames - 1, 1) / fps
+            last = _last(frames, fps)
             self._timeline = gui.add_slider("Time", 0.0, last, step=1 / fps, initial_value=0.0)
             self._timeline.on_update(_safely(lambda e: _seek(desk, e, fps)))
         follow = gui.add_checkbox("Follow", True, hint="keep the fighters in the middle")
@@ -115,13 +122,28 @@ class Panel:
             with gui.add_folder("Parameters"):
                 for control in controls:
                     _add_control(gui, desk, control)
-        with gui.add_folder("Score"):
-            self._score = gui.add_html("")
+        self._score = None
+        if actions is not None:
+            with gui.add_folder("Actions"):
+                listed = ActionList(gui, actions, desk.choose)
+                listed.listen(_safely)
+            _add_keys(gui, _moves(listed))
+        else:
+            with gui.add_folder("Score"):
+                self._score = gui.add_html("")
         with gui.add_folder("Events"):
             self._lines = gui.add_html("")
-            decisions = gui.add_checkbox("Decisions", False, hint="list every decision as well")
-            decisions.on_update(_safely(lambda e: desk.show_decisions(e.target.value)))
-        _add_keys(gui, desk)
+            if actions is None:
+                decisions = gui.add_checkbox("Decisions", False, hint="list every decision as well")
+                decisions.on_update(_safely(lambda e: desk.show_decisions(e.target.value)))
+        _add_keys(gui, _runs(desk))
+
+    def set_length(self, frames: int) -> None:
+        """Another recording is played, from its start."""
+        if self._timeline is not None:
+            self._shown["frame"] = 0
+            self._timeline.value = 0.0
+            self._timeline.max = _last(frames, self._fps)
 
     def playing(self, playing: bool) -> None:
         """Label the button for what it does next."""
@@ -144,9 +166,14 @@ class Panel:
             ("score", self._score, score_html(log)),
             ("lines", self._lines, lines_html(log, self._fps)),
         ):
-            if self._shown.get(name) != content:
+            if handle is not None and self._shown.get(name) != content:
                 self._shown[name] = content
                 handle.content = content
+
+
+def _last(frames: int, fps: float) -> float:
+    """The end [s] of a slider over frames: never its start."""
+    return max(frames - 1, 1) / fps
 
 
 def _seek(desk: Desk, event: Any, fps: float) -> None:
@@ -167,12 +194,25 @@ def _add_control(gui: viser.GuiApi, desk: Desk, control: Control) -> None:
     slider.on_update(_safely(lambda e: desk.tune(control, float(e.target.value))))
 
 
-def _add_keys(gui: viser.GuiApi, desk: Desk) -> None:
-    keys: tuple[tuple[str, Any, Callable[[], None]], ...] = (
+Keys = tuple[tuple[str, Any, Callable[[], None]], ...]
+
+
+def _runs(desk: Desk) -> Keys:
+    return (
         ("Play or pause", "space", desk.toggle),
         ("One frame on", "N", desk.step_once),
         ("Restart", "R", desk.restart),
     )
+
+
+def _moves(listed: ActionList) -> Keys:
+    return (
+        ("Next action", "F", lambda: listed.move(1)),
+        ("Previous action", "B", lambda: listed.move(-1)),
+    )
+
+
+def _add_keys(gui: viser.GuiApi, keys: Keys) -> None:
     for label, key, act in keys:
         gui.add_command(label, hotkey=key).on_trigger(_safely(lambda _, act=act: act()))
 

@@ -19,6 +19,7 @@ import numpy as np
 from kumite.body import body_mesh
 from kumite.clip import LIMBS, forward_kinematics
 from kumite.errors import KumiteError
+from kumite.scene.actions import ActionPlayback
 from kumite.scene.recording import Event
 from kumite.scene.stage import Playback, Stage
 from kumite.studio import bodies, props, ring
@@ -42,6 +43,7 @@ class _Picture:
     wxyz: np.ndarray  # [K, J, 4]
     objects: np.ndarray  # [O, 3] m
     hits: list[Event] = field(default_factory=list)
+    note: str = ""  # behind the time
 
 
 class Studio:
@@ -92,6 +94,7 @@ class Studio:
             frames=len(stage.recording) if isinstance(stage, Playback) else None,
             fps=stage.fps,
             controls=[c for c in getattr(stage, "controls", ()) if isinstance(c, Control)],
+            actions=stage if isinstance(stage, ActionPlayback) else None,
         )
         picture = self._look()
         self._follow.jump(_midpoint(picture))
@@ -144,6 +147,16 @@ class Studio:
             if isinstance(self.stage, Playback):
                 self.stage.seek(frame)
                 self._after_jump()
+        self._poke()
+
+    def choose(self, action: int) -> None:
+        """Play an action of a library over and over; other stages have none."""
+        with self._lock:
+            if isinstance(self.stage, ActionPlayback):
+                self.stage.choose(action)
+                self._panel.set_length(len(self.stage.recording))
+                self._after_jump()
+                self._playing = self._rewound = True
         self._poke()
 
     def _after_jump(self) -> None:
@@ -216,9 +229,11 @@ class Studio:
 
     def _step(self, frames: int) -> None:
         for _ in range(frames):
+            before = self.stage.frame
             if not self.stage.step():
                 self._ended, self._playing = True, False
                 break
+            self._rewound |= self.stage.frame < before  # what is played over and over
         fresh = self._log.update(self.stage.events, self.stage.frame)
         self._hits += [e for e in fresh if e.kind == "hit"]
         self._redraw = True
@@ -257,6 +272,7 @@ class Studio:
             np.array(stage.wxyz, dtype=np.float64),
             np.array([o.position for o in stage.objects], dtype=np.float64).reshape(-1, 3),
             hits,
+            f" · frame {stage.clip_frame} of its clip" if isinstance(stage, ActionPlayback) else "",
         )
 
     def _draw(self, picture: _Picture, seconds: float) -> None:
@@ -274,6 +290,7 @@ class Studio:
         if now - self._panel_at >= PANEL_PERIOD or seconds == 0.0 or not self._playing:
             self._panel_at = now
             note = " · ended" if self._ended else "" if self._playing else " · paused"
+            note = picture.note + note
             self._panel.playing(self._playing)
             with self._lock:
                 self._panel.show(self._log, picture.frame, note)
