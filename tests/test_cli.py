@@ -15,7 +15,7 @@ import pytest
 from kumite import cli
 from kumite.clip import forward_kinematics
 from kumite.export.bvh import write_bvh
-from kumite.graph import Library, save_library
+from kumite.graph import Library, load_library, save_library
 from kumite.graph.library import VERSION
 from kumite.mocap import load
 from kumite.performer import STYLES, perform
@@ -27,6 +27,14 @@ def built(library: Library, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A library file, in a folder of its own."""
     path = tmp_path_factory.mktemp("built") / "built.kumite"
     save_library(path, library)
+    return path
+
+
+@pytest.fixture(scope="module")
+def built_whole(whole: Library, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A library of whole actions."""
+    path = tmp_path_factory.mktemp("built") / "whole.kumite"
+    save_library(path, whole)
     return path
 
 
@@ -91,6 +99,61 @@ def test_from_mocap_files_to_a_fight(kumite, library: Library, tmp_path: Path):
     a, _ = forward_kinematics(red.skeleton, red.root_position, red.wxyz)
     b, _ = forward_kinematics(back.skeleton, back.root_position, back.wxyz)
     assert np.abs(a - b).max() < 1e-3
+
+
+def test_from_mocap_files_to_a_graph_of_actions(
+    kumite, whole: Library, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """segment → an edit → build --level actions → info → studio, on BVH files."""
+    for clip in list(whole.clips)[:6]:
+        write_bvh(tmp_path / "mocap" / f"{clip.name}.bvh", clip)
+    status, *_ = kumite("segment", "mocap", "-o", "mine.txt")
+    assert status == 0
+    text = (tmp_path / "mine.txt").read_text()
+    line = next(row for row in text.splitlines() if "  attack " in row)
+    label = line.split()[-2]
+    changed = line.replace(f" {label} ", ' "my own" ')
+    (tmp_path / "mine.txt").write_text(text.replace(line, changed))
+    options = ["--level", "actions", "--actions", "mine.txt", "--alike", "1.5"]
+    status, text, err = kumite("build", "mocap", "-o", "my.kumite", *options)
+    assert status == 0, err
+    found = load_library(tmp_path / "my.kumite")
+    assert found.actions is not None and "my own" in found.actions.label
+    assert f"{len(found.actions)} actions, {found.report['stretches']} of them connected" in text
+    assert f"{found.report['nodes']} nodes of postures alike within 1.5 rad" in text
+
+    status, again, _ = kumite("info", "my.kumite")
+    assert status == 0 and all(row in text for row in again.splitlines())
+    values = json.loads(kumite("info", "my.kumite", "--json", "--plot", "hits.png")[1])
+    assert values["level"] == "actions" and values["clips"] == 6
+    ways = np.diff(found.table.action_start)
+    assert values["ways_on"] == {
+        "least": ways.min(), "most": ways.max(), "after_an_action": round(ways.mean(), 4),
+    }  # fmt: skip
+    assert (tmp_path / "hits.png").stat().st_size > 10_000
+
+    monkeypatch.setenv("DEMO_SECONDS", "1")
+    status, text, err = kumite("studio", "my.kumite", "--port", "0", "--no-browser")
+    assert status == 0 and "http://127.0.0.1:" in text, err
+
+
+def test_a_library_of_frames_says_what_it_holds(kumite, built: Path, library: Library):
+    status, text, _ = kumite("info", built)
+    r = library.report
+    assert status == 0 and f"{r['states']} states, {r['actions']} actions of" in text
+    assert f"mean join cost {r['mean_join_cost']:.2f}" in text
+    values = json.loads(kumite("info", built, "--json")[1])
+    assert values["level"] == "frames" and values["states"] == r["states"]
+
+
+def test_policies_plan_on_a_graph_of_actions(kumite, built_whole: Path):
+    status, text, err = kumite(
+        "run", "sparring", "-l", built_whole, "--seconds", "10", "--seed", "1", "--json"
+    )
+    assert status == 0, err
+    fought = json.loads(text)
+    assert sum(c["landed"] for c in fought["characters"]) >= 2
+    assert fought["min_separation_m"] > 0.25
 
 
 def test_the_built_in_performer_needs_no_files(kumite, tmp_path: Path):
@@ -239,6 +302,9 @@ def test_two_skeletons_in_one_library(kumite, tmp_path):
     assert status == 0 and len(json.loads(text)["clips"]) == 2
 
 
+WHOLE = ["build", "still.bvh", "-o", "x.kumite", "--level", "actions"]
+
+
 @pytest.mark.parametrize(
     ("args", "expected"),
     [
@@ -249,6 +315,23 @@ def test_two_skeletons_in_one_library(kumite, tmp_path):
         (["build", "still.bvh", "-o", "x.kumite", "--event", "hop"], "unknown event 'hop'"),
         (["build", "still.bvh", "-o", "x.kumite", "--per-second", "0"], "per_second"),
         (["build", "still.bvh", "-o", "x.kumite", "--per-second", "inf"], "per_second inf"),
+        (["build", "still.bvh", "-o", "x.kumite", "--level", "action"], "did you mean 'actions'"),
+        (["build", "still.bvh", "-o", "x.kumite", "--alike", "1"], "--alike: of --level actions"),
+        (
+            ["build", "still.bvh", "-o", "x.kumite", "--actions", "a.txt"],
+            "--actions: of --level actions; expected none with --level frames",
+        ),
+        ([*WHOLE, "--event", "left"], "--event: of --level frames"),
+        ([*WHOLE, "--per-second", "9"], "--per-second: of --level frames"),
+        ([*WHOLE, "--alike", "-1"], "alike -1.0; expected more than 0 rad"),
+        ([*WHOLE, "--actions", "none.txt"], "none.txt: cannot be read"),
+        ([*WHOLE, "--actions", "still.bvh"], "still.bvh:1: "),
+        (WHOLE, "too few actions for a graph"),
+        (["info", "BUILT", "--fps", "30"], "--fps: of motion capture"),
+        (["info", "none.kumite"], "none.kumite: cannot be read"),
+        (["studio", "BUILT"], "a library of frames, without actions; expected one built with"),
+        (["studio", "BUILT", "--count", "3"], "--count: of a scene"),
+        (["studio", "none.kumite"], "none.kumite: cannot be read"),
         (["build", "still.bvh", "-o", "x.kumite", "--fps", "1e9"], "at most 1000000"),
         (
             ["run", "sparring", "-l", "BUILT", "--seconds", "1e9"],

@@ -84,3 +84,16 @@ def test_a_folder_that_cannot_be_written_is_said(tmp_path):
         files.writing(tmp_path / "file" / "x"),
     ):
         pass
+
+
+def test_what_a_file_holds_is_told_without_reading_it_all(tmp_path):
+    files.save(tmp_path / "x", "thing", 3, {}, {"a": np.zeros(50)})
+    assert files.kind_of(tmp_path / "x") == "thing"
+    whole = (tmp_path / "x").read_bytes()
+    for k, other in enumerate(
+        (b"", b"\xff" * 200, whole[:20], b"HIERARCHY\nROOT hips\n", b"\0" * 9)
+    ):
+        (tmp_path / f"{k}").write_bytes(other)
+        assert files.kind_of(tmp_path / f"{k}") is None
+    assert files.kind_of(tmp_path) is None and files.kind_of(tmp_path / "none") is None
+    assert files.kind_of("") is None and files.kind_of("x" * 5000) is None
