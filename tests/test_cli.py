@@ -114,7 +114,7 @@ def test_from_mocap_files_to_a_graph_of_actions(
     label = line.split()[-2]
     changed = line.replace(f" {label} ", ' "my own" ')
     (tmp_path / "mine.txt").write_text(text.replace(line, changed))
-    options = ["--level", "actions", "--actions", "mine.txt", "--alike", "1.5"]
+    options = ["--level", "actions", "--actions", "mine.txt", "--alike", "1.5", "--most-ways", "9"]
     status, text, err = kumite("build", "mocap", "-o", "my.kumite", *options)
     assert status == 0, err
     found = load_library(tmp_path / "my.kumite")
@@ -127,8 +127,9 @@ def test_from_mocap_files_to_a_graph_of_actions(
     values = json.loads(kumite("info", "my.kumite", "--json", "--plot", "hits.png")[1])
     assert values["level"] == "actions" and values["clips"] == 6
     ways = np.diff(found.table.action_start)
+    assert ways.max() == 9
     assert values["ways_on"] == {
-        "least": ways.min(), "most": ways.max(), "after_an_action": round(ways.mean(), 4),
+        "least": ways.min(), "most": ways.max(), "mean": round(ways.mean(), 4),
     }  # fmt: skip
     assert (tmp_path / "hits.png").stat().st_size > 10_000
 
@@ -323,6 +324,7 @@ WHOLE = ["build", "still.bvh", "-o", "x.kumite", "--level", "actions"]
         ),
         ([*WHOLE, "--event", "left"], "--event: of --level frames"),
         ([*WHOLE, "--per-second", "9"], "--per-second: of --level frames"),
+        ([*WHOLE, "--most-ways", "1"], "most_ways 1; expected at least 2"),
         ([*WHOLE, "--alike", "-1"], "alike -1.0; expected more than 0 rad"),
         ([*WHOLE, "--actions", "none.txt"], "none.txt: cannot be read"),
         ([*WHOLE, "--actions", "still.bvh"], "still.bvh:1: "),

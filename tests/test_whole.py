@@ -14,6 +14,7 @@ from kumite.annotate import DIRECTIONS, KINDS, NO_LIMB, Actions
 from kumite.clip import Clip, ClipSet, concatenate
 from kumite.errors import KumiteError
 from kumite.graph import Library, build_action_library, load_library, pose_features, save_library
+from kumite.graph.whole import MOST_WAYS
 from kumite.rotation import from_axis_angle, planar_compose
 from kumite.scene import CharacterMetrics, Recording, measure
 from kumite.scene.metrics import source_skate
@@ -175,11 +176,28 @@ def check_graph(library: Library) -> None:
     facing = clips.facing
     there = planar_compose(facing[table.first - 1], table.displacement)
     assert np.allclose(there[:, :2], facing[table.last][:, :2], atol=1e-9)
-    # Reactions are offered by none; all else is.
-    state, start = nodes_of(library)
+    # Without a limit, what states of a node offer is the same; no node offers a reaction.
+    full = build_action_library(clips, actions, most_ways=10**6)
+    state, start = nodes_of(full)
     assert len(np.unique(state)) == library.report["nodes"]
     reaction = actions.kind[mine] == KINDS.index("reaction")
     assert np.array_equal(start == -1, reaction)
+    # With one, each state offers a part of that: of each label what joins best, and no more.
+    assert np.array_equal(full.table.first, table.first)
+    word = np.array([actions.label[a] for a in mine])
+    for s in range(table.states):
+        some, every = (t.stretch[t.actions_of(s)] for t in (table, full.table))
+        cost = dict(zip(every.tolist(), full.table.join_cost[full.table.actions_of(s)].tolist()))
+        assert set(some.tolist()) <= set(every.tolist())
+        assert len(some) == min(len(every), MOST_WAYS)
+        for label in np.unique(word[every]).tolist():
+            left_out = [
+                cost[k] for k in set(every.tolist()) - set(some.tolist()) if word[k] == label
+            ]
+            taken = [cost[k] for k in some.tolist() if word[k] == label]
+            assert not left_out or not taken or max(taken) <= min(left_out)
+        if len(np.unique(word[every])) <= MOST_WAYS:
+            assert set(word[some].tolist()) == set(word[every].tolist())
     # Postures of one node are alike: on average nearer than asked for, told by the slow twin.
     features = pose_features(clips)
     for n in range(state.max() + 1):
@@ -212,7 +230,7 @@ def test_the_performers_graph(whole: Library):
     check_graph(whole)
     r = whole.report
     assert r["stretches"] >= 0.95 * r["actions_found"]
-    assert r["mean_ways_out"] > 100
+    assert r["mean_ways_out"] > 40
     assert r["reactions"] > 20 and r["attacks"] > 100
     assert r["hits_kept"] >= 0.95 * r["hits"]
 
@@ -276,8 +294,8 @@ def test_the_real_boxers_graph(boxer: Library):
     check_graph(library)
     r = library.report
     assert r["stretches"] >= 0.9 * r["actions_found"]
-    assert r["mean_ways_out"] > 100
+    assert r["mean_ways_out"] > 40
     for walk in (random_walk(library, 60.0, seed) for seed in range(3)):
         assert walk.joins > 30  # else there is nothing to be judged
-        assert walk.skate_ratio is not None and walk.skate_ratio <= 1.3  # 1.05 to 1.16
-        assert walk.join_jump_m_s <= 0.35  # 0.22 to 0.27
+        assert walk.skate_ratio is not None and walk.skate_ratio <= 1.3  # 1.03 to 1.18
+        assert walk.join_jump_m_s <= 0.35  # 0.26 to 0.28

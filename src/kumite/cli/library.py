@@ -24,16 +24,6 @@ def is_library(source: Path | str) -> bool:
     return files.kind_of(source) == KIND or str(source).endswith(ENDING)
 
 
-def ways_on(library: Library) -> np.ndarray:
-    """How many actions are offered at each node of an action-level graph.
-
-    An action starts in one node, so what states offer is the same or has nothing in common.
-    """
-    table = library.table
-    _, one = np.unique(table.stretch[table.action_start[:-1]], return_index=True)
-    return np.diff(table.action_start)[one]
-
-
 def library_values(library: Library) -> dict[str, Any]:
     """What a library holds, as JSON values: how it was built, then what is counted here."""
     clips = library.clips
@@ -43,11 +33,11 @@ def library_values(library: Library) -> dict[str, Any]:
         "clips": len(clips.names),
     }
     if library.actions is not None:
-        ways = ways_on(library)
+        ways = np.diff(library.table.action_start)
         values["ways_on"] = {
             "least": int(ways.min()),
             "most": int(ways.max()),
-            "after_an_action": round(library.table.actions / library.table.states, 4),
+            "mean": round(float(ways.mean()), 4),
         }
     return values
 
@@ -74,17 +64,16 @@ def library_lines(library: Library) -> list[str]:
                 f"mean join cost {r['mean_join_cost']:.2f}, accepted below {r['threshold']:.2f}"
             )
         return lines
-    kind, ways = library.actions.kind[library.action_of_stretch], ways_on(library)
+    kind, ways = library.actions.kind[library.action_of_stretch], np.diff(table.action_start)
     counts = ", ".join(f"{name} {np.sum(kind == k)}" for k, name in enumerate(KINDS))
     joined = table.join_cost[table.join_cost > 0]
     lines += [
         f"{len(library.actions)} actions, {len(table.first)} of them connected"
         + (f" ({r['hits_kept']} blows)" if r else "")
         + f", of {table.duration.mean() / clips.fps:.2f} s on average: {counts}",
-        f"{len(ways)} nodes"
-        + (f" of postures alike within {r['alike']:g} rad" if r else "")
-        + f", {ways.min()} to {ways.max()} actions offered at each, "
-        f"{table.actions / table.states:.1f} after an action on average; reactions at none",
+        (f"{r['nodes']} nodes of postures alike within {r['alike']:g} rad; " if r else "")
+        + f"after an action {ways.min()} to {ways.max()} are offered, {ways.mean():.1f} on "
+        "average, reactions never",
     ]
     if len(joined):
         lines.append(f"mean join cost {joined.mean():.2f} rad")

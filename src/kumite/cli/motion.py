@@ -181,6 +181,10 @@ def build(
         float | None,
         typer.Option(help="Actions: postures nearer than that are one node [rad] (default 1.2)."),
     ] = None,
+    most_ways: Annotated[
+        int | None,
+        typer.Option(help="Actions: as many are offered after one at most (default 64)."),
+    ] = None,
     as_json: JsonOption = False,
     fps: FpsOption = None,
     file_fps: FileFpsOption = None,
@@ -190,20 +194,28 @@ def build(
     role: RoleOption = None,
 ) -> None:
     """Build a library: clips, contacts, effective hits and the motion graph, in one file."""
+    from kumite.annotate import read_actions
     from kumite.files import refuse_unwritable
-    from kumite.graph import save_library
+    from kumite.graph import build_action_library, build_library, save_library
 
     _refuse_of_another_level(
         level,
         {
             "frames": {"--event": event, "--per-second": per_second},
-            "actions": {"--actions": actions, "--alike": alike},
+            "actions": {"--actions": actions, "--alike": alike, "--most-ways": most_ways},
         },
     )
     refuse_unwritable(output)  # before the work, not after
     loaded = _load_clips(source, fps, file_fps, metres_per_unit, up_axis, ground, role)
     with progress() as bars:
-        library = _built(loaded.clip_set(), level, event, per_second, actions, alike, Stages(bars))
+        stages, clips = Stages(bars), loaded.clip_set()
+        if level == "frames":
+            given = _given(event=event, per_second=per_second)
+            library = build_library(clips, **given, progress=stages)
+        else:
+            mine = None if actions is None else read_actions(actions, clips)
+            given = _given(alike=alike, most_ways=most_ways)
+            library = build_action_library(clips, mine, **given, progress=stages)
     save_library(output, library)
     if as_json:
         print_json({**library_values(library), "output": str(output)})
@@ -233,26 +245,9 @@ def _refuse_of_another_level(level: str, options: dict[str, dict[str, Any]]) -> 
                 raise KumiteError(f"{name}: of --level {other}; expected none with --level {level}")
 
 
-def _built(
-    clips: Any,
-    level: str,
-    event: str | None,
-    per_second: float | None,
-    actions: Path | None,
-    alike: float | None,
-    stages: Stages,
-) -> Any:
-    """A library of clips; None: the level's own default."""
-    from kumite.annotate import read_actions
-    from kumite.graph import build_action_library, build_library
-
-    if level == "frames":
-        frames = {"event": event, "per_second": per_second}
-        given: dict[str, Any] = {k: v for k, v in frames.items() if v is not None}
-        return build_library(clips, **given, progress=stages)
-    given = {} if alike is None else {"alike": alike}
-    mine = None if actions is None else read_actions(actions, clips)
-    return build_action_library(clips, mine, **given, progress=stages)
+def _given(**options: Any) -> dict[str, Any]:
+    """The options that were given: of the others the library knows the default."""
+    return {name: value for name, value in options.items() if value is not None}
 
 
 @app.command()
