@@ -16,8 +16,16 @@ if TYPE_CHECKING:
     from kumite.clip import Clip, ClipSet, Skeleton, concatenate, mirror, resample
     from kumite.control import approach, solve, strike
     from kumite.errors import KumiteError
-    from kumite.graph import Library, build_library, builtin_library, load_library, save_library
+    from kumite.graph import (
+        Library,
+        build_action_library,
+        build_library,
+        builtin_library,
+        load_library,
+        save_library,
+    )
     from kumite.scene import (
+        BoutScene,
         LiveScene,
         Playback,
         Recording,
@@ -37,8 +45,16 @@ _WHERE = {
     "clip": ("Clip", "ClipSet", "Skeleton", "concatenate", "mirror", "resample"),
     "control": ("approach", "solve", "strike"),
     "errors": ("KumiteError",),
-    "graph": ("Library", "build_library", "builtin_library", "load_library", "save_library"),
+    "graph": (
+        "Library",
+        "build_action_library",
+        "build_library",
+        "builtin_library",
+        "load_library",
+        "save_library",
+    ),
     "scene": (
+        "BoutScene",
         "LiveScene",
         "Playback",
         "Recording",
@@ -66,6 +82,7 @@ def __dir__() -> list[str]:
 
 
 __all__ = [
+    "BoutScene",
     "Clip",
     "ClipSet",
     "KumiteError",
@@ -75,6 +92,7 @@ __all__ = [
     "Recording",
     "Skeleton",
     "approach",
+    "build_action_library",
     "build_library",
     "builtin_library",
     "builtin_scenes",
