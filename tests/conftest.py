@@ -38,3 +38,9 @@ def whole() -> Library:
 def boxer(mocap: Path) -> Library:
     """The real boxer's library."""
     return build_library(mocap_files.load(mocap / "boxer").clip_set())
+
+
+@pytest.fixture(scope="session")
+def fighters() -> Library:
+    """The built-in performer's library of whole actions, as it boxes."""
+    return builtin_library(None, style="boxing", level="actions")

@@ -207,13 +207,15 @@ def contact(state, p, since, until, moves, rules):
         for b in range(radius.shape[0]):
             wx, wy, wz = body[row, b, 0] - qx, body[row, b, 1] - qy, body[row, b, 2] - qz
             r = radius[b] + rules.tip_radius
-            along = min(max((wx * ux + wy * uy + wz * uz) / way2, 0.0), 1.0)
+            nearest = (wx * ux + wy * uy + wz * uz) / way2
+            along = min(max(nearest, 0.0), 1.0)
             dx, dy, dz = wx - along * ux, wy - along * uy, wz - along * uz
             d2 = dx * dx + dy * dy + dz * dz
             if d2 >= r * r:
                 continue
-            # Where the way enters the sphere: of two the first is met.
-            enters = along - np.sqrt((r * r - d2) / way2)
+            # Where the line enters the sphere: of two the first is met.
+            beyond = nearest - along
+            enters = nearest - np.sqrt((r * r - d2) / way2 + beyond * beyond)
             if enters < soonest:
                 met, soonest = b, enters
         if met != NOTHING:
@@ -245,13 +247,33 @@ def land(state, p, n, part, moves, rules, want):
 
 
 @kernel
+def caught(state, chosen, since, until, moves, rules):
+    """Whether the two are within the distance of a catch after ``since``, no later than ``until``.
+
+    Of the frames after ``chosen`` every ``stride`` is looked at.
+    """
+    if rules.catch == 0.0:
+        return False
+    for time in range(int(chosen) + 1, int(until) + 1, rules.stride):
+        if time <= since:
+            continue
+        x, z, _ = place_at(state, 0, time, moves)
+        u, w, _ = place_at(state, 1, time, moves)
+        if (u - x) ** 2 + (w - z) ** 2 < rules.catch * rules.catch:
+            return True
+    return False
+
+
+@kernel
 def play_on(state, since, until, both, moves, rules, want):
     """What happens after ``since`` until someone chooses, or, with ``both``, until both have ended.
 
     Returns what player 0 and player 1 dealt, weighted by their own w⁺, what they dealt unweighted
-    (D of Eq. 6), and coop of reactions. ``state`` is changed by reactions.
+    (D of Eq. 6), coop of reactions, and whether one was caught before someone chooses. ``state`` is
+    changed by reactions.
     """
     weights = want.weights
+    chosen, near = since, False
     score0, score1, dealt0, dealt1, coop = 0.0, 0.0, 0.0, 0.0, 0.0
     while True:
         ends = (state[END], state[FIELDS + END])
@@ -271,8 +293,10 @@ def play_on(state, since, until, both, moves, rules, want):
                     first, when, n0 = 1, at, NOTHING
                 elif at > when:
                     n1 = NOTHING
+        if not both and not near:
+            near = caught(state, chosen, since, min(when, to), moves, rules)
         if first == NOTHING:
-            return score0, score1, dealt0, dealt1, coop
+            return score0, score1, dealt0, dealt1, coop, near
         since = when
         # Blows of one frame both land: the state before it counts for both.
         if n0 != NOTHING and n1 != NOTHING:
@@ -343,7 +367,8 @@ def judge(stretches, other, place, spread, attacked, moves, rules, flaws):
     """What is wrong with each of stretches [n] (section V-C), into flaws [n].
 
     other [m, TRUNK, 3], place [m, 2]: the opponent frame by frame, seen from here, then it stands;
-    its spheres are within ``spread`` [m] of its place.
+    its spheres are within ``spread`` [m] of its place. Ranges are those of the nearest the two get,
+    where the stretch is begun or later.
     """
     body, track, start, radius = moves.body, moves.track, moves.start, moves.radius
     duration, kind, stride = moves.duration, moves.kind, rules.stride
@@ -352,7 +377,7 @@ def judge(stretches, other, place, spread, attacked, moves, rules, flaws):
     cone = np.cos(rules.facing)
     for n in range(stretches.shape[0]):
         k = stretches[n]
-        flaw, nearest2 = 0, np.inf
+        flaw, nearest2 = 0, place[0, 0] * place[0, 0] + place[0, 1] * place[0, 1]
         apart = widest + spread + moves.spread[k]  # m: farther off, trunks cannot touch
         for i in range(stride, duration[k] + stride, stride):
             f = min(i, duration[k])
@@ -381,8 +406,12 @@ def judge(stretches, other, place, spread, attacked, moves, rules, flaws):
 def worst_allowed(flaws):
     """The flaws that must be put up with: those of no action but the least important (section V-C).
 
-    Actions whose flaws are below the number returned are kept.
+    Actions whose flaws are below the number returned are kept. Where all overlap, OVERLAPS is taken
+    from all of them: what counts then is the last frame, and the other flaws as ever.
     """
+    if flaws.min() >= OVERLAPS:
+        for n in range(flaws.shape[0]):
+            flaws[n] -= OVERLAPS
     least = flaws.min()
     limit = 1
     while limit <= least:
@@ -410,19 +439,6 @@ def movement(state, p, moves, want):
 
 
 @kernel
-def caught(state, since, until, moves, rules):
-    """Whether the two are within the distance of a catch at any frame after ``since``."""
-    if rules.catch == 0.0:
-        return False
-    for time in range(int(since) + 1, int(until) + 1, rules.stride):
-        x, z, _ = place_at(state, 0, time, moves)
-        u, w, _ = place_at(state, 1, time, moves)
-        if (u - x) ** 2 + (w - z) ** 2 < rules.catch * rules.catch:
-            return True
-    return False
-
-
-@kernel
 def edge(state, p, k, opposing, moves, rules, want):
     """What it adds that player p begins stretch k in ``state``, where it stands there already.
 
@@ -430,10 +446,11 @@ def edge(state, p, k, opposing, moves, rules, want):
     """
     weights = want.weights[p]
     since = state[p * FIELDS + BEGUN]
-    score0, score1, dealt0, dealt1, coop = play_on(state, since, np.inf, False, moves, rules, want)
+    score0, score1, dealt0, dealt1, coop, near = play_on(
+        state, since, np.inf, False, moves, rules, want
+    )
     given, taken = (score0, dealt1) if p == 0 else (score1, dealt0)
-    until = min(state[END], state[FIELDS + END])
-    if caught(state, since, until, moves, rules):
+    if near:
         given += weights[GIVEN_SHORT]
         taken += 1.0
     comp, there = movement(state, p, moves, want)
@@ -473,7 +490,7 @@ def expand(game, state, children):
         children.comp[count], children.coop[count] = edge(
             child, p, stretches[n], opposing, moves, rules, want
         )
-        if state[FRESH] != 0.0:
+        if state[FRESH] != 0.0 and p == 0:
             children.comp[count] -= want.tired[stretches[n]]
         count += 1
     return count, stretches.shape[0], p
@@ -487,7 +504,7 @@ def leaves(game, children, count):
     for n in range(count):
         state = children.state[n]
         since = min(state[END], state[FIELDS + END])
-        score0, _, dealt0, dealt1, coop = play_on(state, since, np.inf, True, moves, rules, want)
+        score0, _, dealt0, dealt1, coop, _ = play_on(state, since, np.inf, True, moves, rules, want)
         if dealt0 > 0.0 or dealt1 > 0.0:
             children.comp[n] += score0 - weights[0, TAKEN] * dealt1
         children.coop[n] += coop
