@@ -155,6 +155,18 @@ def narrow(levels, d, comp):
     return levels.low[d] >= levels.high[d]
 
 
+@kernel
+def best_first(nodes, first, count, player):
+    """Order children so that what ``player`` prefers at once comes first: bounds come sooner."""
+    sign = -1.0 if player == SEARCHER else 1.0
+    order = np.argsort(sign * nodes.comp[first : first + count], kind="mergesort")
+    kept = empty_children(count, nodes.state.shape[1])
+    for c in range(count):
+        copy_row(nodes, first + c, kept, c)
+    for c in range(count):
+        copy_row(kept, order[c], nodes, first + c)
+
+
 def descend(game, depth, most, block, levels, prune, nodes, considered):
     """Search ``depth`` levels below row 0 of ``block``, whose scores are the sums along its path.
 
@@ -175,6 +187,8 @@ def descend(game, depth, most, block, levels, prune, nodes, considered):
         considered[d + 1] += before
         add_path(block, n, below, kept)
         if kept > 0 and d + 1 < depth:
+            if prune:  # coop is 0: of equals it makes no difference which comes first
+                best_first(block, below, kept, player[d + 1])
             d += 1
             at[d], count[d] = 0, kept
             low[d], high[d] = low[d - 1], high[d - 1]
@@ -300,12 +314,18 @@ def work(game, nodes, start, stop, left, most, player, prune, made, considered):
     for w in prange(workers):
         block = empty_children((left + 1) * most, nodes.state.shape[1])
         levels = empty_levels(left, player)
-        for n in range(start + w, stop, workers):
+        turn = np.arange(start + w, stop, workers)
+        if prune:
+            sign = -1.0 if player == SEARCHER else 1.0
+            turn = turn[np.argsort(sign * nodes.comp[turn], kind="mergesort")]
+        for n in turn:
             copy_row(nodes, n, block, 0)
             descend(game, left, most, block, levels, prune, made[w], considered[w])
             copy_row(block, 0, nodes, n)
             if prune:
-                narrow(levels, 0, block.comp[0])
+                # One as good is found exactly, wherever it stands: the first of equals is chosen.
+                short = np.inf if player == OPPONENT else -np.inf
+                narrow(levels, 0, np.nextafter(block.comp[0], short))
 
 
 def search(game, state, depth, most, prune):
