@@ -218,9 +218,7 @@ class Toy:
                 if reaction != NOTHING:
                     victim = self.sides[1 - p]
                     coop += victim.asked.get(reaction, 0) * victim.style.requirement
-                    fighters[1 - p] = self.begin(
-                        reaction, time, self.place(seen[1 - p], time)
-                    )
+                    fighters[1 - p] = self.begin(reaction, time, self.place(seen[1 - p], time))
 
     def begin(self, move: int, time: int, anchor: np.ndarray) -> Fighter:
         return Fighter(move, time, time + self.moves[move].duration, anchor)
@@ -416,7 +414,20 @@ def random_toy(seed: int, brawl: bool) -> tuple[Toy, Moment]:
         w = rng.uniform(0, 20, 9)
         heading = float(rng.uniform(-3, 3))
         styles.append(
-            Style(w[0], w[1], w[2] / 20, w[3] / 10, w[4], w[5], w[6], w[7], w[8] / 10, 1.0, 5.0, heading)
+            Style(
+                w[0],
+                w[1],
+                w[2] / 20,
+                w[3] / 10,
+                w[4],
+                w[5],
+                w[6],
+                w[7],
+                w[8] / 10,
+                1.0,
+                5.0,
+                heading,
+            )
         )
     sides = tuple(
         Side(
@@ -457,5 +468,3 @@ def turned(now: Moment, toy: Toy, by: tuple[float, float, float]) -> Moment:
     """The same moment elsewhere in the scene."""
     one, two = (f._replace(anchor=planar_compose(by, f.anchor)) for f in now.fighters)
     return Moment((one, two), now.fresh)
-
-

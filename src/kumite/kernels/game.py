@@ -224,23 +224,22 @@ def contact(state, p, since, until, moves, rules):
 
 
 @kernel
-def land(state, p, n, part, moves, rules, want):
+def land(before, state, p, n, part, moves, rules, want):
     """Tip n of player p meets a part: damage D (Eq. 6), and what its reaction is asked for.
 
-    The victim's action is cut short there.
+    The victim's action is cut short there. before: the state as it was when the blow landed.
     """
     a = p * FIELDS
-    state[a + LANDED] = moves.tip_blow[n]
-    damage = moves.tip_speed[n] * rules.vulnerable[part]
+    speed = moves.tip_speed[n]
+    damage = speed * rules.vulnerable[part]
     if damage == 0.0:
         return 0.0, 0.0
-    speed = moves.tip_speed[n]
     size = FALL if speed >= rules.fall_from else STAGGER if speed >= rules.stagger_from else FLINCH
     response = want.response[1 if part == HEAD else 0, size]
     if response == NOTHING:
         return damage, 0.0
-    time = state[a + BEGUN] + moves.tip_when[n]
-    x, z, yaw = place_at(state, 1 - p, time, moves)
+    time = before[a + BEGUN] + moves.tip_when[n]
+    x, z, yaw = place_at(before, 1 - p, time, moves)
     begin(state, 1 - p, response, time, x, z, yaw, moves)
     asked = want.asked[1 - p, response] * want.weights[1 - p, REQUIREMENT]
     return damage, asked
@@ -272,53 +271,49 @@ def play_on(state, since, until, both, moves, rules, want):
     (D of Eq. 6), coop of reactions, and whether one was caught before someone chooses. ``state`` is
     changed by reactions.
     """
-    weights = want.weights
     chosen, near = since, False
     score0, score1, dealt0, dealt1, coop = 0.0, 0.0, 0.0, 0.0, 0.0
     while True:
         ends = (state[END], state[FIELDS + END])
         to = min(until, max(ends[0], ends[1]) if both else min(ends[0], ends[1]))
-        first, when = NOTHING, np.inf
+        when = np.inf
         n0, part0, n1, part1 = NOTHING, NOTHING, NOTHING, NOTHING
-        k0, k1 = int(state[STRETCH]), int(state[FIELDS + STRETCH])
-        if state[BEGUN] + moves.last_tip[k0] > since and moves.last_tip[k0] != NOTHING:
-            n0, part0 = contact(state, 0, since, to, moves, rules)
-            if n0 != NOTHING:
-                first, when = 0, state[BEGUN] + moves.tip_when[n0]
-        if state[FIELDS + BEGUN] + moves.last_tip[k1] > since and moves.last_tip[k1] != NOTHING:
-            n1, part1 = contact(state, 1, since, to, moves, rules)
-            if n1 != NOTHING:
-                at = state[FIELDS + BEGUN] + moves.tip_when[n1]
-                if at < when:
-                    first, when, n0 = 1, at, NOTHING
-                elif at > when:
-                    n1 = NOTHING
+        for p in range(2):
+            k, begun = int(state[p * FIELDS + STRETCH]), state[p * FIELDS + BEGUN]
+            if moves.last_tip[k] == NOTHING or begun + moves.last_tip[k] <= since:
+                continue
+            n, part = contact(state, p, since, min(to, when), moves, rules)
+            if n == NOTHING:
+                continue
+            if begun + moves.tip_when[n] < when:
+                when, n0 = begun + moves.tip_when[n], NOTHING  # sooner than the other's
+            if p == 0:
+                n0, part0 = n, part
+            else:
+                n1, part1 = n, part
         if not both and not near:
             near = caught(state, chosen, since, min(when, to), moves, rules)
-        if first == NOTHING:
+        if when == np.inf:
             return score0, score1, dealt0, dealt1, coop, near
         since = when
         # Blows of one frame both land: the state before it counts for both.
-        if n0 != NOTHING and n1 != NOTHING:
-            kept = state[FIELDS : 2 * FIELDS].copy()
-            d, asked = land(state, 0, n0, part0, moves, rules, want)
-            reacting = state[FIELDS : 2 * FIELDS].copy()
-            state[FIELDS : 2 * FIELDS] = kept
-            dealt0, coop = dealt0 + d, coop + asked
-            score0 += d * weights[0, GIVEN_SHORT if moves.short[k0] else GIVEN_LONG]
-            d, asked = land(state, 1, n1, part1, moves, rules, want)
-            dealt1, coop = dealt1 + d, coop + asked
-            score1 += d * weights[1, GIVEN_SHORT if moves.short[k1] else GIVEN_LONG]
-            if reacting[BEGUN] == when:
-                state[FIELDS : 2 * FIELDS] = reacting
-        elif n0 != NOTHING:
-            d, asked = land(state, 0, n0, part0, moves, rules, want)
-            dealt0, coop = dealt0 + d, coop + asked
-            score0 += d * weights[0, GIVEN_SHORT if moves.short[k0] else GIVEN_LONG]
-        else:
-            d, asked = land(state, 1, n1, part1, moves, rules, want)
-            dealt1, coop = dealt1 + d, coop + asked
-            score1 += d * weights[1, GIVEN_SHORT if moves.short[k1] else GIVEN_LONG]
+        before = state.copy()
+        if n0 != NOTHING:
+            state[LANDED] = moves.tip_blow[n0]
+        if n1 != NOTHING:
+            state[FIELDS + LANDED] = moves.tip_blow[n1]
+        for p in range(2):
+            n, part = (n0, part0) if p == 0 else (n1, part1)
+            if n == NOTHING:
+                continue
+            damage, asked = land(before, state, p, n, part, moves, rules, want)
+            short = moves.short[int(before[p * FIELDS + STRETCH])]
+            worth = damage * want.weights[p, GIVEN_SHORT if short else GIVEN_LONG]
+            coop += asked
+            if p == 0:
+                score0, dealt0 = score0 + worth, dealt0 + damage
+            else:
+                score1, dealt1 = score1 + worth, dealt1 + damage
 
 
 @kernel
