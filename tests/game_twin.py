@@ -1,4 +1,4 @@
-"""A slow, obvious twin of the fight (Shum et al. 2012, sections V and VI), and toys to compare it on.
+"""A slow, obvious twin of the fight (Shum et al. 2012, V and VI), and toys to compare it on.
 
 The fight goes on frame by frame, all in scene coordinates, by objects. Nothing is shared with
 kumite.kernels.game but its tuples, which :meth:`Toy.game` fills.
@@ -271,18 +271,18 @@ class Toy:
 
     # As tests.reference.game_tree plays it -------------------------------------------------------
 
-    def player(self, now: Moment) -> int:
-        return 0 if now.fighters[0].end <= now.fighters[1].end else 1
+    def player(self, state: Moment) -> int:
+        return 0 if state.fighters[0].end <= state.fighters[1].end else 1
 
-    def offered(self, now: Moment) -> list[int]:
-        return self.choices[self.moves[now.fighters[self.player(now)].move].into]
+    def offered(self, state: Moment) -> list[int]:
+        return self.choices[self.moves[state.fighters[self.player(state)].move].into]
 
-    def considered(self, now: Moment) -> int:
-        return len(self.offered(now))
+    def considered(self, state: Moment) -> int:
+        return len(self.offered(state))
 
-    def edges(self, now: Moment) -> list[Edge]:
-        p, offered = self.player(now), self.offered(now)
-        me, other = now.fighters[p], now.fighters[1 - p]
+    def edges(self, state: Moment) -> list[Edge]:
+        p, offered = self.player(state), self.offered(state)
+        me, other = state.fighters[p], state.fighters[1 - p]
         time, side = me.end, self.sides[p]
         style = side.style
         edges = []
@@ -302,7 +302,7 @@ class Toy:
                 comp += style.given_short - style.taken
             if self.suits is not None:
                 comp += style.suitability * float(np.float32(self.suits[k, other.move]))  # Eq. 7
-            if now.fresh and p == 0:
+            if state.fresh and p == 0:
                 comp -= self.tired.get(k, 0.0)
             coop = reacted + side.asked.get(k, 0) * style.requirement  # Eq. 10
             if side.goal is not None:
@@ -313,14 +313,14 @@ class Toy:
             edges.append(Edge(k, comp if p == 0 else -comp, coop, Moment(after, False)))
         return edges
 
-    def leaf(self, now: Moment) -> tuple[float, float]:
-        since = min(f.end for f in now.fighters)
-        _, score, dealt, coop, _ = self.play(now.fighters, since, True)
+    def leaf(self, state: Moment) -> tuple[float, float]:
+        since = min(f.end for f in state.fighters)
+        _, score, dealt, coop, _ = self.play(state.fighters, since, True)
         return score[0] - self.sides[0].style.taken * dealt[1], coop
 
 
 def entering(a, b, centre, radius: float) -> float | None:
-    """When the line through a and b enters a sphere (0 at a, 1 at b), if the way between meets it."""
+    """When the line from a (0) to b (1) enters a sphere, if the way between meets it."""
     way = b - a
     length2 = float(way @ way)
     nearest = a + np.clip((centre - a) @ way / max(length2, 1e-12), 0, 1) * way
@@ -345,7 +345,7 @@ def as_state(now: Moment) -> np.ndarray:
     return out
 
 
-# Toys to compare on --------------------------------------------------------------------------------
+# Toys to compare on -------------------------------------------------------------------------------
 
 #  m, of who looks along z: head, chest, waist, pelvis; left forearm, hand; right forearm, hand
 STANCE = np.array(

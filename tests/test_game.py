@@ -138,7 +138,7 @@ def jab(blow: int = 0, speed: float = 6.0, short: bool = False) -> Move:
 
 
 def facing(toy: Toy, far: float, other: int = STAND, end: int = 5, fresh: bool = True) -> Moment:
-    """The searcher chooses at 0; its opponent began ``other`` ``far`` m away and ends at ``end``."""
+    """The searcher chooses at 0; the opponent does ``other``, begun ``far`` m away, until ``end``."""
     return Moment(
         (standing(STAND, 0, (0, 0, 0), toy), standing(other, end, (0, far, math.pi), toy)), fresh
     )
@@ -476,6 +476,16 @@ def boxer_tree(mocap: Path) -> GameTree:
 
 def test_bounds_do_not_change_the_answer(performer_tree: GameTree):
     bounds_change_nothing(performer_tree, [2] * 14 + [3] * 6)
+
+
+def test_weights_of_what_nobody_asks_for_do_not_keep_bounds_from_being_used(
+    performer_tree: GameTree,
+):
+    state = some_start(performer_tree, np.random.default_rng(3))
+    sides = Player(STYLES["boxer_path"]), Player()
+    short, full = (performer_tree.decide(state, sides, bounds=b) for b in (True, False))
+    assert (short.stretch, short.comp, short.coop) == (full.stretch, full.comp, 0.0)
+    assert short.nodes.sum() < full.nodes.sum()
 
 
 @pytest.mark.slow

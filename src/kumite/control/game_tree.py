@@ -214,17 +214,20 @@ class GameTree:
         tired = np.zeros(len(self.kinds))
         tired[list(recent)] = players[0].boredom
         goal = np.zeros((2, 2))
+        asked = np.stack([self.asked(p) for p in players])
         for p, player in enumerate(players):
             if player.goal is None:
                 weights[p, kernels.PLACE] = 0.0
             else:
                 goal[p] = player.goal
+            if not asked[p].any():
+                weights[p, REQUIREMENT] = 0.0
         return kernels.Game(
             *self.moves,
             *rules,
             weights,
             self.suits,
-            np.stack([self.asked(p) for p in players]),
+            asked,
             goal,
             self.response,
             tired,
