@@ -138,7 +138,7 @@ def jab(blow: int = 0, speed: float = 6.0, short: bool = False) -> Move:
 
 
 def facing(toy: Toy, far: float, other: int = STAND, end: int = 5, fresh: bool = True) -> Moment:
-    """The searcher chooses at 0; the opponent does ``other``, begun ``far`` m away, until ``end``."""
+    """The searcher chooses at 0; the other, ``far`` m away, until ``end`` does ``other``."""
     return Moment(
         (standing(STAND, 0, (0, 0, 0), toy), standing(other, end, (0, far, math.pi), toy)), fresh
     )
