@@ -30,6 +30,7 @@ from kumite.synthesis.response import find_responses
 
 TRUNK = ("head", "chest", "waist", "pelvis")
 ARMS = ("left_forearm", "left_hand", "right_forearm", "right_hand")
+BULK = 0.08  # m by which a trunk is thicker for the other body: arms are held before it
 STOUTER = 1.1  # the spheres of a part are that much thicker than its capsule: they stand for all
 DEEPEST = 6  # levels; a seventh would take hours
 BOREDOM = 1e5  # score that an action loses while it was used recently: a blow of 1 m/s
@@ -65,6 +66,7 @@ class Player:
     wanted: tuple[str, ...] = ()  # A⁺, kinds or labels of actions
     unwanted: tuple[str, ...] = ()  # A⁻
     goal: tuple[float, float] | None = None  # m, the next check point
+    facing: float | None = None  # rad, in place of the rules' own
     boredom: float = BOREDOM  # score that an action loses while it was used recently (B11)
 
     def __post_init__(self) -> None:
@@ -113,6 +115,7 @@ class GameTree:
         self.labels = tuple(actions.label[a] for a in action.tolist())
         self.moves = _moves(library)
         self.response = self._responses()
+        self.blow_rank = _ranks(library)
         self.most = int(np.diff(library.table.action_start).max())
 
     @cached_property
@@ -171,10 +174,12 @@ class GameTree:
         ends: tuple[float, float],
         facing: tuple[np.ndarray, np.ndarray],
         now: float,
+        landed: tuple[int, int] = (NO_BLOW, NO_BLOW),
     ) -> np.ndarray:
         """The state of two players at a time [frames], the searcher first.
 
-        facing: the planar frames [3] in which they are now; begun: when their stretches began.
+        facing: the planar frames [3] in which they are now; begun: when their stretches began;
+        landed: the blow of the library that each has landed last with what it is doing, or NO_BLOW.
         """
         out = np.empty(kernels.STATE)
         out[kernels.FRESH] = 1.0
@@ -188,7 +193,7 @@ class GameTree:
                 begun[p],
                 ends[p],
                 *anchor,
-                NOTHING,
+                NOTHING if landed[p] == NO_BLOW else self.blow_rank[landed[p]],
             ]
         return out
 
@@ -201,7 +206,7 @@ class GameTree:
         )
         rules = kernels.Rules(
             max(1, round(r.every * fps)),
-            float(r.facing),
+            np.array([r.facing if p.facing is None else p.facing for p in players]),
             float(r.attack_range),
             float(r.defence_range),
             float(r.tip_radius),
@@ -263,6 +268,13 @@ class GameTree:
         )
 
 
+def _ranks(library: Library) -> np.ndarray:
+    """The place in time [X] of each blow of a library."""
+    out = np.empty(len(library.strikes), dtype=np.int64)
+    out[np.argsort(library.strikes.frame, kind="stable")] = np.arange(len(out))
+    return out
+
+
 def _moves(library: Library) -> kernels.Moves:
     """The stretches as the kernels take them."""
     table, clips = library.table, library.clips
@@ -298,8 +310,6 @@ def _moves(library: Library) -> kernels.Moves:
 
     now, before = placed(frame[row]), placed(frame[row] - 1)
     speed = np.linalg.norm(now - before, axis=1) * clips.fps
-    rank = np.empty(len(library.strikes), dtype=np.int64)
-    rank[np.argsort(library.strikes.frame, kind="stable")] = np.arange(len(rank))
     last_tip = np.full(len(duration), NOTHING)
     np.maximum.at(last_tip, owner[row], local[row])
     actions, action = library.actions, library.action_of_stretch
@@ -320,11 +330,12 @@ def _moves(library: Library) -> kernels.Moves:
         np.maximum.reduceat(off, start[:-1]),
         spheres.astype(np.float32),
         radius,
+        radius[: len(TRUNK)] + BULK,
         np.searchsorted(owner[row], np.arange(len(duration) + 1)).astype(np.int64),
         local[row].astype(np.int64),
         np.ascontiguousarray(now),
         np.ascontiguousarray(before),
         speed,
-        rank[windows[frame[row], limb]],
+        _ranks(library)[windows[frame[row], limb]],
         last_tip.astype(np.int64),
     )

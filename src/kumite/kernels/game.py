@@ -58,7 +58,8 @@ class Moves(NamedTuple):
     track: np.ndarray  # [R, 3] facing frames (x, z, yaw)
     spread: np.ndarray  # [L] m from the facing frame to a trunk's sphere on the ground, at most
     body: np.ndarray  # [R, B, 3] m, float32, centres of spheres
-    radius: np.ndarray  # [B] m
+    radius: np.ndarray  # [B] m, met by a tip
+    bulk: np.ndarray  # [TRUNK] m, kept from the other trunk: arms are held before it
     tip_start: np.ndarray  # [L + 1]
     tip_when: np.ndarray  # [P] frames since the beginning, ascending in a stretch
     tip: np.ndarray  # [P, 3] m
@@ -72,7 +73,7 @@ class Rules(NamedTuple):
     """What counts."""
 
     stride: int  # frames between those in which bodies are compared
-    facing: float  # rad, from the opponent at the end of an action, at most
+    facing: np.ndarray  # [2] rad from the opponent at the end of an action, at most
     attack_range: float  # m
     defence_range: float  # m
     tip_radius: float  # m
@@ -113,6 +114,7 @@ def parts(game):
             game.spread,
             game.body,
             game.radius,
+            game.bulk,
             game.tip_start,
             game.tip_when,
             game.tip,
@@ -344,32 +346,32 @@ def opponent_ahead(state, q, time, x, z, yaw, rows, moves):
 
 
 @kernel
-def overlaps(body, row, other, i, radius):
+def overlaps(body, row, other, i, bulk):
     """Whether the trunk spheres of two bodies overlap."""
     for a in range(TRUNK):
         for b in range(TRUNK):
             dx = body[row, a, 0] - other[i, b, 0]
             dy = body[row, a, 1] - other[i, b, 1]
             dz = body[row, a, 2] - other[i, b, 2]
-            r = radius[a] + radius[b]
+            r = bulk[a] + bulk[b]
             if dx * dx + dy * dy + dz * dz < r * r:
                 return True
     return False
 
 
 @kernel
-def judge(stretches, other, place, spread, attacked, moves, rules, flaws):
+def judge(stretches, other, place, spread, attacked, facing, moves, rules, flaws):
     """What is wrong with each of stretches [n] (section V-C), into flaws [n].
 
     other [m, TRUNK, 3], place [m, 2]: the opponent frame by frame, seen from here, then it stands;
     its spheres are within ``spread`` [m] of its place. Ranges are those of the nearest the two get,
-    where the stretch is begun or later.
+    where the stretch is begun or later. facing [rad]: how far from the opponent it may end.
     """
-    body, track, start, radius = moves.body, moves.track, moves.start, moves.radius
+    body, track, start, bulk = moves.body, moves.track, moves.start, moves.bulk
     duration, kind, stride = moves.duration, moves.kind, rules.stride
     last = place.shape[0] - 1
-    widest = 2.0 * radius[:TRUNK].max()
-    cone = np.cos(rules.facing)
+    widest = 2.0 * bulk.max()
+    cone = np.cos(facing)
     for n in range(stretches.shape[0]):
         k = stretches[n]
         flaw, nearest2 = 0, place[0, 0] * place[0, 0] + place[0, 1] * place[0, 1]
@@ -380,7 +382,7 @@ def judge(stretches, other, place, spread, attacked, moves, rules, flaws):
             dx, dz = place[h, 0] - track[row, 0], place[h, 1] - track[row, 1]
             d2 = dx * dx + dz * dz
             nearest2 = min(nearest2, d2)
-            if d2 < apart * apart and overlaps(body, row, other, h, radius):
+            if d2 < apart * apart and overlaps(body, row, other, h, bulk):
                 flaw |= OVERLAPS
                 if f == duration[k]:
                     flaw |= ENDS_INSIDE
@@ -470,7 +472,17 @@ def expand(game, state, children):
     longest = moves.duration.max() + 1
     other, place = opponent_ahead(state, q, time, x, z, yaw, longest, moves)
     flaws = np.empty(stretches.shape[0], dtype=np.int64)
-    judge(stretches, other, place, moves.spread[opposing], attacked, moves, rules, flaws)
+    judge(
+        stretches,
+        other,
+        place,
+        moves.spread[opposing],
+        attacked,
+        rules.facing[p],
+        moves,
+        rules,
+        flaws,
+    )
     limit = worst_allowed(flaws)
     count = 0
     for n in range(stretches.shape[0]):

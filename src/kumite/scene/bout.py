@@ -16,6 +16,7 @@ from kumite.control import Progress
 from kumite.control.game_tree import MEMORY, Decision, GameTree, Player
 from kumite.errors import KumiteError
 from kumite.graph import Library
+from kumite.kernels.blow import NO_BLOW
 from kumite.kernels.game import FALL, FLINCH, NOTHING, STAGGER
 from kumite.scene.fighters import BoutSettings
 from kumite.scene.floor import Floor, Landing
@@ -123,6 +124,7 @@ class BoutScene:
         self.progress = [None if r is None else Progress(r) for r in routes]
         self._done: list[set[str]] = [set() for _ in range(count)]
         self._told = [0] * count
+        self._landed = [NO_BLOW] * count  # the blow each has landed last in what it is doing
         for k, f in enumerate(self.settings.fighter):
             facing = np.array([*f.position, np.radians(f.yaw_deg)])
             cast.place(k, int(table.target[self.stretch[k]]), facing)
@@ -170,6 +172,7 @@ class BoutScene:
             ),
             (facing[k], facing[o]),
             float(self.frame),
+            (self._landed[k], self._landed[o]),
         )
         self._set_goals()
         players = (self.players[k], self.players[o])
@@ -204,6 +207,7 @@ class BoutScene:
         chosen = np.full(len(self.names), stretch)
         self.cast.begin(np.array([k]), chosen)
         self.stretch[k] = stretch
+        self._landed[k] = NO_BLOW
         self._done[k] |= {self.tree.kinds[stretch], self.tree.labels[stretch]}
 
     # Bodies --------------------------------------------------------------------------------------
@@ -214,6 +218,7 @@ class BoutScene:
         part = body.parts[landing.part]
         speed = float(np.linalg.norm(landing.velocity))
         blocked = part in ARMS
+        self._landed[landing.who] = landing.blow
         self._event(
             "hit",
             landing.who,

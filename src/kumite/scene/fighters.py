@@ -82,6 +82,7 @@ class FighterSettings(_Settings):
     depth: Annotated[int, Field(ge=1, le=DEEPEST)] = 3
     wanted: tuple[str, ...] = ()  # A⁺, kinds or labels of actions
     unwanted: tuple[str, ...] = ()  # A⁻
+    facing_deg: Positive | None = None  # from the opponent at the end, in place of the bout's
     boredom: Annotated[Finite, Field(ge=0)] = BOREDOM
     point: tuple[CheckPointSettings, ...] = ()
     path: PathSettings | None = None  # before the points
@@ -106,7 +107,15 @@ class FighterSettings(_Settings):
         return route.then(Route(points)) if points else route
 
     def player(self) -> Player:
-        return Player(self.weights(), self.depth, self.wanted, self.unwanted, boredom=self.boredom)
+        facing = None if self.facing_deg is None else self.facing_deg * 3.141592653589793 / 180.0
+        return Player(
+            self.weights(),
+            self.depth,
+            self.wanted,
+            self.unwanted,
+            facing=facing,
+            boredom=self.boredom,
+        )
 
 
 class BoutSettings(_Settings):
