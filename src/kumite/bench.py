@@ -186,7 +186,7 @@ def _share_of_stream(folder: Path) -> float:
     index = np.empty((*reward.shape, 8), dtype=np.int32)
     weight = np.empty(index.shape, dtype=np.float32)
     kernels.successor_corners(
-        table.displacement, points, *behaviour.grid.kernel_arguments(), index, weight
+        table.displacement, points, False, *behaviour.grid.kernel_arguments(), index, weight
     )
     factor = np.full(len(reward), 0.5, dtype=np.float32)
     value, q = np.zeros((table.states, len(points)), np.float32), np.empty_like(reward)
