@@ -22,7 +22,7 @@ class Temper:
 
     approach: float = 1.0  # weight of bringing blows' reach over the target
     strike: float = 6.0  # weight of hitting it
-    facing: float = 3.0  # how much turning away from it meanwhile cuts an action's worth
+    facing: float = 3.5  # how much turning away from it meanwhile cuts an action's worth
     few: int = 3  # how many of the best actions are drawn from
     slack: float = 0.2  # how much less an action may gain than the best one, as a share of that
     boredom: float = 0.5  # how much of its gain an action loses while it was used recently

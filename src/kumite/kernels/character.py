@@ -434,6 +434,41 @@ def reach(upper, middle, end, below, goal, parents, offsets, wxyz, position, wor
 
 
 @kernel
+def give_way(axes, owner, levers, displacement, shares, damping, turn):
+    """Turns [N, 3] of joints that move a point by about ``displacement`` [3], damped least squares.
+
+    axes [M, 3]: about which joint owner [M] may turn; levers [N, 3]: from the joints to the point.
+    Joint n gives way shares^n times as readily as the first. Added to ``turn``.
+    """
+    moves = np.empty((axes.shape[0], 3))
+    normal = np.zeros((3, 3))
+    for m in range(axes.shape[0]):
+        ax, ay, az = axes[m]
+        x, y, z = levers[owner[m]]
+        moves[m, 0], moves[m, 1], moves[m, 2] = ay * z - az * y, az * x - ax * z, ax * y - ay * x
+        ready = shares ** owner[m]
+        for r in range(3):
+            for c in range(3):
+                normal[r, c] += ready * moves[m, r] * moves[m, c]
+    more = damping * (normal[0, 0] + normal[1, 1] + normal[2, 2]) + 1e-9
+    for r in range(3):
+        normal[r, r] += more
+    # normal w = displacement by cofactors: it is symmetric and positive definite.
+    a, b, c = normal[0]
+    d, e, f = normal[1, 1], normal[1, 2], normal[2, 2]
+    ca, cb, cc = d * f - e * e, c * e - b * f, b * e - c * d
+    one = a * ca + b * cb + c * cc
+    u, v, w = displacement
+    x = (ca * u + cb * v + cc * w) / one
+    y = (cb * u + (a * f - c * c) * v + (b * c - a * e) * w) / one
+    z = (cc * u + (b * c - a * e) * v + (a * d - b * b) * w) / one
+    for m in range(axes.shape[0]):
+        angle = shares ** owner[m] * (moves[m, 0] * x + moves[m, 1] * y + moves[m, 2] * z)
+        for k in range(3):
+            turn[owner[m], k] += angle * axes[m, k]
+
+
+@kernel
 def move_feet(foot_offset, foot_velocity, planted, half_life, longest, dt):
     """Offsets of the two feet over one frame: held on the ground, faded in the air, in place.
 

@@ -37,7 +37,7 @@ class CharacterSettings(_Settings):
     approach: Annotated[Finite, Field(ge=0)] = 1.0  # weights of the behaviours
     strike: Annotated[Finite, Field(ge=0)] = 6.0
     behaviours: dict[str, Weight] = {}  # weights of others, by name
-    facing: Annotated[Finite, Field(ge=0)] = 3.0
+    facing: Annotated[Finite, Field(ge=0)] = 3.5
     few: Annotated[int, Field(ge=1, le=50)] = 3  # drawn from the best few actions
     again: Annotated[int, Field(ge=1, le=50)] = 4  # of the best actions weighed a step further
     personal_space: Annotated[Finite, Field(ge=0, le=3)] = 0.7  # m kept to the other's body
@@ -69,7 +69,7 @@ class CrowdSettings(_Settings):
     approach: Annotated[Finite, Field(ge=0)] = 1.0
     strike: Annotated[Finite, Field(ge=0)] = 6.0
     behaviours: dict[str, Weight] = {}
-    facing: Annotated[Finite, Field(ge=0)] = 3.0
+    facing: Annotated[Finite, Field(ge=0)] = 3.5
     few: Annotated[int, Field(ge=1, le=50)] = 3
     again: Annotated[int, Field(ge=1, le=50)] = 1  # a crowd decides in a fifth of the time
     personal_space: Annotated[Finite, Field(ge=0, le=3)] = 0.7

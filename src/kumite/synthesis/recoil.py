@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from kumite.clip import SIDES, Skeleton, forward_kinematics
+from kumite.kernels import character as kernels
 from kumite.rotation import conjugate, exp, multiply, rotate
 
 REACTION_HALF_LIFE = 0.16  # s, in which a struck body recovers
@@ -75,13 +76,8 @@ def _step(
 
     axes [M, 3]: about which joint owner [M] may turn; levers [N, 3]: from the joints to the point.
     """
-    moves = np.cross(axes, levers[owner])
-    ready = SHARES ** owner[:, None] * moves
-    normal = moves.T @ ready
-    normal += DAMPING * np.trace(normal) * np.eye(3) + 1e-9 * np.eye(3)
-    angle = ready @ np.linalg.solve(normal, displacement)
     turn = np.zeros_like(levers)
-    np.add.at(turn, owner, angle[:, None] * axes)
+    kernels.give_way(axes, owner, levers, displacement, SHARES, DAMPING, turn)
     return turn
 
 
