@@ -69,7 +69,6 @@ class Fighter(NamedTuple):
 
 class Moment(NamedTuple):
     fighters: tuple[Fighter, Fighter]
-    fresh: bool = True
 
 
 @dataclass
@@ -303,7 +302,7 @@ class Toy:
                 comp += style.given_short - style.taken
             if self.suits is not None:
                 comp += style.suitability * float(np.float32(self.suits[k, other.move]))  # Eq. 7
-            if state.fresh and p == 0:
+            if p == 0:
                 comp -= self.tired.get(k, 0.0)
             coop = reacted + side.asked.get(k, 0) * style.requirement  # Eq. 10
             if side.goal is not None:
@@ -311,7 +310,7 @@ class Toy:
             if style.heading:
                 assert style.preferred_heading is not None
                 coop -= style.heading * float(wrap_angle(yaw - style.preferred_heading)) ** 2
-            edges.append(Edge(k, comp if p == 0 else -comp, coop, Moment(after, False)))
+            edges.append(Edge(k, comp if p == 0 else -comp, coop, Moment(after)))
         return edges
 
     def leaf(self, state: Moment) -> tuple[float, float]:
@@ -342,7 +341,6 @@ def as_state(now: Moment) -> np.ndarray:
             *f.anchor,
             f.landed,
         ]
-    out[kernels.FRESH] = float(now.fresh)
     return out
 
 
@@ -468,4 +466,4 @@ def random_toy(seed: int, brawl: bool) -> tuple[Toy, Moment]:
 def turned(now: Moment, toy: Toy, by: tuple[float, float, float]) -> Moment:
     """The same moment elsewhere in the scene."""
     one, two = (f._replace(anchor=planar_compose(by, f.anchor)) for f in now.fighters)
-    return Moment((one, two), now.fresh)
+    return Moment((one, two))

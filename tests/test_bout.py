@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from kumite.control.game_tree import GameTree, Player
 from kumite.errors import KumiteError
-from kumite.graph import Library, builtin_library
+from kumite.graph import Library, build_action_library, builtin_library
+from kumite.mocap import load
 from kumite.scene import BoutScene, SceneSettings, load_scene, measure, record
 
 
@@ -56,6 +59,17 @@ def test_two_fight_and_the_log_says_what_was_looked_at(actions: Library):
         assert c.skate_m_s < 0.02 and c.join_jump_m_s < 0.6
 
 
+def test_the_real_boxer_fights(mocap: Path):
+    real = build_action_library(load(mocap / "boxer").clip_set())
+    scenes = [_fight(real, seed=seed) for seed in (1, 2)]
+    for scene in scenes:
+        _run(scene, 15.0)
+        for name in scene.names:
+            chosen = [e for e in scene.events if e.kind == "decision" and e.character == name]
+            assert any(scene.tree.kinds[e.data["stretch"]] == "attack" for e in chosen)
+    assert sum(_landed(s, name) for s in scenes for name in s.names) >= 4
+
+
 def test_a_blow_that_lands_brings_its_reaction_and_one_that_is_blocked_does_not(actions: Library):
     scene = _fight(actions, seed=3)
     _run(scene, 15.0)
@@ -64,6 +78,18 @@ def test_a_blow_that_lands_brings_its_reaction_and_one_that_is_blocked_does_not(
     assert any(not e.data["blocked"] for e in hits)
     struck = {(e.frame, e.data["victim"]) for e in hits if not e.data["blocked"]}
     assert reactions == struck
+
+
+def test_who_has_waited_long_attacks_though_it_may_miss(actions: Library):
+    scene = _fight(actions)
+    tree, player = scene.tree, scene.players[0]
+    calm = [k for k, kind in enumerate(tree.kinds) if kind in ("idle", "transition")][:8]
+    tired = tree.game((player, player), tuple(calm)).tired
+    kind = np.array(tree.kinds)
+    assert set(tired[kind == "attack"]) == {0.0}
+    assert set(tired[calm]) == {player.boredom + 8 * player.restlessness}
+    fresh = np.setdiff1d(np.flatnonzero(np.isin(kind, ("idle", "transition"))), calm)
+    assert set(tired[fresh]) == {8 * player.restlessness}
 
 
 def test_the_same_seed_gives_the_same_fight(actions: Library):

@@ -137,10 +137,10 @@ def jab(blow: int = 0, speed: float = 6.0, short: bool = False) -> Move:
     return still(10, kind=ATTACK, short=short, tips=[tip])
 
 
-def facing(toy: Toy, far: float, other: int = STAND, end: int = 5, fresh: bool = True) -> Moment:
+def facing(toy: Toy, far: float, other: int = STAND, end: int = 5) -> Moment:
     """The searcher chooses at 0; the other, ``far`` m away, until ``end`` does ``other``."""
     return Moment(
-        (standing(STAND, 0, (0, 0, 0), toy), standing(other, end, (0, far, math.pi), toy)), fresh
+        (standing(STAND, 0, (0, 0, 0), toy), standing(other, end, (0, far, math.pi), toy))
     )
 
 
@@ -403,13 +403,12 @@ def test_suitability_is_that_against_what_the_other_does():
     assert [c.comp for c in expanded(toy, facing(toy, 2.0, JAB, end=9))] == [2.0, 6.0]
 
 
-def test_what_was_used_lately_costs_the_searcher_its_next_choice_only():
+def test_what_was_used_lately_costs_the_searcher_and_not_the_other():
     toy = boxing([STAND, PASS], style=FREE, tired={PASS: 3.0})
     assert [c.comp for c in expanded(toy, facing(toy, 2.0))] == [0.0, -3.0]
-    assert [c.comp for c in expanded(toy, facing(toy, 2.0, fresh=False))] == [0.0, 0.0]
     assert [c.comp for c in expanded(toy, facing(toy, 2.0, end=-1))] == [0.0, 0.0]
     below = expanded(toy, expanded(toy, facing(toy, 2.0, end=20))[0].state)
-    assert [c.comp for c in below] == [0.0, 0.0]
+    assert [c.comp for c in below] == [0.0, -3.0]
 
 
 @pytest.mark.jit_off

@@ -33,8 +33,9 @@ ARMS = ("left_forearm", "left_hand", "right_forearm", "right_hand")
 BULK = 0.08  # m by which a trunk is thicker for the other body: arms are held before it
 STOUTER = 1.1  # the spheres of a part are that much thicker than its capsule: they stand for all
 DEEPEST = 6  # levels; a seventh would take hours
-BOREDOM = 1e5  # score that an action loses while it was used recently: a blow of 1 m/s
-MEMORY = 4  # actions back that "recently" goes
+BOREDOM = 1e5  # score that an action loses for each recent use: a blow of 1 m/s
+RESTLESSNESS = 30.0  # score that an action loses for each recent one of its kind
+MEMORY = 8  # actions back that "recently" goes
 COOPERATIVE = [HEADING, PLACE, REQUIREMENT]  # columns of weights
 
 
@@ -67,7 +68,8 @@ class Player:
     unwanted: tuple[str, ...] = ()  # A⁻
     goal: tuple[float, float] | None = None  # m, the next check point
     facing: float | None = None  # rad, in place of the rules' own
-    boredom: float = BOREDOM  # score that an action loses while it was used recently (B11)
+    boredom: float = BOREDOM  # score that an action loses for each recent use (B11)
+    restlessness: float = RESTLESSNESS  # and for each recent one of its kind
 
     def __post_init__(self) -> None:
         if not 1 <= self.depth <= DEEPEST:
@@ -117,6 +119,12 @@ class GameTree:
         self.response = self._responses()
         self.blow_rank = _ranks(library)
         self.most = int(np.diff(library.table.action_start).max())
+
+    @cached_property
+    def kind_number(self) -> np.ndarray:
+        """[L] the same number for stretches of one kind; idling counts as moving about."""
+        calm = ["transition" if k == "idle" else k for k in self.kinds]
+        return np.unique(calm, return_inverse=True)[1]
 
     @cached_property
     def names(self) -> frozenset[str]:
@@ -182,7 +190,6 @@ class GameTree:
         landed: the blow of the library that each has landed last with what it is doing, or NO_BLOW.
         """
         out = np.empty(kernels.STATE)
-        out[kernels.FRESH] = 1.0
         for p in range(2):
             k = stretches[p]
             i = int(np.clip(now - begun[p], 0, self.moves.duration[k]))
@@ -216,8 +223,6 @@ class GameTree:
             vulnerable,
         )
         weights = np.stack([p.style.as_array() for p in players])
-        tired = np.zeros(len(self.kinds))
-        tired[list(recent)] = players[0].boredom
         goal = np.zeros((2, 2))
         asked = np.stack([self.asked(p) for p in players])
         for p, player in enumerate(players):
@@ -235,8 +240,15 @@ class GameTree:
             asked,
             goal,
             self.response,
-            tired,
+            self._tired(players[0], recent),
         )
+
+    def _tired(self, player: Player, recent: tuple[int, ...]) -> np.ndarray:
+        """What recent choices cost each stretch [L]: if it was among them, or many of its kind."""
+        out, lately, kinds = np.zeros(len(self.kinds)), list(recent), self.kind_number
+        np.add.at(out, lately, player.boredom)
+        like = np.bincount(kinds[lately], minlength=int(kinds.max()) + 1)
+        return out + player.restlessness * like[kinds]
 
     def decide(
         self,

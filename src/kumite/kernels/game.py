@@ -32,10 +32,9 @@ from kumite.kernels.style import (
     TAKEN,
 )
 
-# The state of one player, one after the other; then the time at which the state was reached.
+# The state of one player; a state is that of both, one after the other.
 STRETCH, BEGUN, END, X, Z, YAW, LANDED, FIELDS = range(8)
-FRESH = 2 * FIELDS  # 1 in the state that is decided in, 0 further down the tree
-STATE = FRESH + 1
+STATE = 2 * FIELDS
 NOTHING = -1
 TRUNK = 4  # spheres that must not overlap: head, chest, belly, pelvis; the rest are arms
 HEAD = 0
@@ -91,7 +90,7 @@ class Want(NamedTuple):
     asked: np.ndarray  # [2, L] 1 in A⁺, -1 in A⁻, else 0
     goal: np.ndarray  # [2, 2] m, the next check point
     response: np.ndarray  # [2, SIZES] stretches of reactions to the trunk and the head, or NOTHING
-    tired: np.ndarray  # [L] what it costs the searcher to begin a stretch now: it used it lately
+    tired: np.ndarray  # [L] what it costs the searcher to begin a stretch: it did the like lately
 
 
 _FIELDS = {n: t for part in (Moves, Rules, Want) for n, t in part.__annotations__.items()}
@@ -491,13 +490,12 @@ def expand(game, state, children):
         child = children.state[count]
         for f in range(STATE):
             child[f] = state[f]
-        child[FRESH] = 0.0
         begin(child, p, stretches[n], time, x, z, yaw, moves)
         children.action[count] = stretches[n]
         children.comp[count], children.coop[count] = edge(
             child, p, stretches[n], opposing, moves, rules, want
         )
-        if state[FRESH] != 0.0 and p == 0:
+        if p == 0:
             children.comp[count] -= want.tired[stretches[n]]
         count += 1
     return count, stretches.shape[0], p

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from kumite.control import CheckPoint, Route, Style, style
-from kumite.control.game_tree import BOREDOM, DEEPEST, Player, Rules
+from kumite.control.game_tree import BOREDOM, DEEPEST, RESTLESSNESS, Player, Rules
 from kumite.control.routes import circle, line, spiral
 from kumite.errors import KumiteError
 
@@ -84,6 +84,7 @@ class FighterSettings(_Settings):
     unwanted: tuple[str, ...] = ()  # A⁻
     facing_deg: Positive | None = None  # from the opponent at the end, in place of the bout's
     boredom: Annotated[Finite, Field(ge=0)] = BOREDOM
+    restlessness: Annotated[Finite, Field(ge=0)] = RESTLESSNESS
     point: tuple[CheckPointSettings, ...] = ()
     path: PathSettings | None = None  # before the points
 
@@ -115,6 +116,7 @@ class FighterSettings(_Settings):
             self.unwanted,
             facing=facing,
             boredom=self.boredom,
+            restlessness=self.restlessness,
         )
 
 
