@@ -214,9 +214,11 @@ class Toy:
                 if damage == 0:
                     continue
                 size = (tip.speed >= self.stagger_from) + (tip.speed >= self.fall_from)
-                reaction = self.response[1 if part == HEAD else 0][size]
+                victim = self.sides[1 - p]
+                responses = self.response[1 if part == HEAD else 0]
+                falls = responses[-1] != NOTHING and victim.asked.get(responses[-1], 0) > 0
+                reaction = responses[-1 if falls else size]
                 if reaction != NOTHING:
-                    victim = self.sides[1 - p]
                     coop += victim.asked.get(reaction, 0) * victim.style.requirement
                     fighters[1 - p] = self.begin(reaction, time, self.place(seen[1 - p], time))
 

@@ -63,10 +63,10 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
             found = load_library(library)
         else:
             bout = settings.bout or BoutSettings()
-            level = "actions" if settings.fighter else "frames"
+            level = "actions" if settings.fighters else "frames"
             found = builtin_library(cache, progress=stages, style=bout.library, level=level)
         stages("preparing the scene")
-        if settings.fighter:
+        if settings.fighters:
             return BoutScene(settings, found, seed=seed)
         return LiveScene(settings, found, seed=seed, cache=cache, progress=Training(bars))
 
@@ -88,7 +88,7 @@ def run(
     from kumite.scene import measure, record
 
     settings = _settings(scene, count)  # before any long work: what is wrong is said at once
-    names = [c.name for c in (*settings.character, *settings.fighter)]
+    names = [c.name for c in (*settings.character, *settings.fighters)]
     _check_outputs(output or [], [*names, *(["the crowd"] if settings.crowd else [])])
     live = _live_scene(settings, library, seed)
     with progress() as bars:

@@ -107,6 +107,7 @@ class GameTree:
         """
         self.library = library
         self.rules = rules or Rules()
+        self._asked: dict[tuple, np.ndarray] = {}  # by A⁺ and A⁻: asked for at every decision
         action = library.action_of_stretch
         actions = library.actions
         assert actions is not None  # action_of_stretch has looked
@@ -135,6 +136,13 @@ class GameTree:
         """1 of each stretch in A⁺, -1 in A⁻, else 0 [L]. Errors: names that no action has; A⁻
         holds all that can be chosen.
         """
+        found = self._asked.get((player.wanted, player.unwanted))
+        if found is None:
+            found = self._ask(player)
+            self._asked[player.wanted, player.unwanted] = found
+        return found
+
+    def _ask(self, player: Player) -> np.ndarray:
         unknown = sorted({*player.wanted, *player.unwanted} - self.names)
         if unknown:
             raise KumiteError(
@@ -267,7 +275,7 @@ class GameTree:
         begin = time.perf_counter()
         game = self.game(players, recent)
         bounds = bounds and not np.any(game.weights[:, COOPERATIVE])
-        run = SEARCH.serial if bounds else SEARCH.parallel
+        run = SEARCH.serial if bounds or players[0].depth < 3 else SEARCH.parallel
         found = run(game, state, players[0].depth, self.most, bounds)
         best = found.best
         return Decision(

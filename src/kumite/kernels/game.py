@@ -236,7 +236,11 @@ def land(before, state, p, n, part, moves, rules, want):
     if damage == 0.0:
         return 0.0, 0.0
     size = FALL if speed >= rules.fall_from else STAGGER if speed >= rules.stagger_from else FLINCH
-    response = want.response[1 if part == HEAD else 0, size]
+    head = 1 if part == HEAD else 0
+    fall = want.response[head, FALL]
+    if fall != NOTHING and want.asked[1 - p, fall] > 0.0:
+        size = FALL  # the victim is to fall
+    response = want.response[head, size]
     if response == NOTHING:
         return damage, 0.0
     time = before[a + BEGUN] + moves.tip_when[n]

@@ -12,7 +12,7 @@ import numpy as np
 
 from kumite.body import ARMS
 from kumite.clip import LIMBS
-from kumite.control import Progress
+from kumite.control import Progress, style
 from kumite.control.game_tree import MEMORY, Decision, GameTree, Player
 from kumite.errors import KumiteError
 from kumite.graph import Library
@@ -23,6 +23,7 @@ from kumite.scene.floor import Floor, Landing
 from kumite.scene.recording import Event
 from kumite.scene.settings import SceneSettings
 from kumite.scene.stage import SceneObject
+from kumite.scene.story import CueSettings, Story
 
 RECOIL = 0.018  # m that a struck segment gives way per m/s of the blow
 SIZES = {FLINCH: "flinch", STAGGER: "stagger", FALL: "fall"}
@@ -59,7 +60,7 @@ class BoutScene:
         """Errors: a library whose graph is not one of whole actions; names in A⁺, A⁻ or at check
         points that no action has.
         """
-        if not settings.fighter:
+        if not settings.fighters:
             raise KumiteError(f"{settings.title!r} is no fight by game tree; expected [[fighter]]s")
         self.settings = settings
         self.library = library
@@ -68,17 +69,27 @@ class BoutScene:
         self.skeleton = library.clips.skeleton
         self.names = settings.names
         self.tree = GameTree(library, (settings.bout or BoutSettings()).rules())
-        self.players = [f.player() for f in settings.fighter]
-        for player, fighter in zip(self.players, settings.fighter):
+        self.players = [f.player() for f in settings.fighters]
+        self._kept: dict[int, dict] = {}  # players as they were before a cue changed them
+        self._check_names()
+        self.reset(seed)
+
+    def _check_names(self) -> None:
+        for player in self.players:
             self.tree.asked(player)
-            for point in fighter.point:
-                unknown = sorted({*point.require, *point.refuse} - self.tree.names)
+        for cue in self.settings.cue:
+            self.tree.asked(Player(wanted=cue.wanted or (), unwanted=cue.unwanted or ()))
+        known = self.tree.names
+        routed = [(f.name, f.point) for f in self.settings.fighters]
+        routed += [(c.who, c.point or ()) for c in self.settings.cue]
+        for name, points in routed:
+            for point in points:
+                unknown = sorted({*point.require, *point.refuse} - known)
                 if unknown:
                     raise KumiteError(
-                        f"{fighter.name}: no action is called {', '.join(map(repr, unknown))} at a "
-                        f"check point; expected one of {', '.join(sorted(self.tree.names))}"
+                        f"{name}: no action is called {', '.join(map(repr, unknown))} at a "
+                        f"check point; expected one of {', '.join(sorted(known))}"
                     )
-        self.reset(seed)
 
     @property
     def controls(self) -> list[StyleControl]:
@@ -105,7 +116,7 @@ class BoutScene:
         self.seed = int(seed)
         self.frame = 0
         self.events: list[Event] = []
-        self.objects: list[SceneObject] = []
+        self.story = Story(self.settings.cue, self.settings.vehicle, self.fps)
         self.decisions: list[Decision] = []
         count = len(self.names)
         rng = np.random.default_rng(self.seed)
@@ -113,22 +124,30 @@ class BoutScene:
         self.cast = cast = self.floor.cast
         table = self.library.table
         number = {name: k for k, name in enumerate(self.names)}
-        self.floor.opponent[:] = [number[f.against] for f in self.settings.fighter]
+        self.floor.opponent[:] = [number[f.against] for f in self.settings.fighters]
         # Everyone starts where idling or moving about has ended, with many ways out.
         calm = np.isin(self.tree.kinds, ("transition", "idle"))
         ways = np.diff(table.action_start)[table.target] * calm
         common = np.flatnonzero(ways >= max(np.quantile(ways[calm], 0.5), 1))
         self.stretch = rng.choice(common, count)
         self._recent = [deque(maxlen=MEMORY) for _ in range(count)]
-        routes = [f.route() for f in self.settings.fighter]
+        for k, kept in self._kept.items():
+            self.players[k].__dict__.update(kept)
+        self._kept = {}
+        self._asked = [(f.wanted, f.unwanted) for f in self.settings.fighters]
+        routes = [f.route() for f in self.settings.fighters]
         self.progress = [None if r is None else Progress(r) for r in routes]
         self._done: list[set[str]] = [set() for _ in range(count)]
         self._told = [0] * count
         self._landed = [NO_BLOW] * count  # the blow each has landed last in what it is doing
-        for k, f in enumerate(self.settings.fighter):
+        for k, f in enumerate(self.settings.fighters):
             facing = np.array([*f.position, np.radians(f.yaw_deg)])
             cast.place(k, int(table.target[self.stretch[k]]), facing)
         self.floor.start()
+
+    @property
+    def objects(self) -> list[SceneObject]:
+        return self.story.objects
 
     @property
     def root_position(self) -> np.ndarray:
@@ -143,8 +162,12 @@ class BoutScene:
 
     def step(self) -> bool:
         """One frame: who has ended an action looks ahead and chooses, all move on."""
+        self.story.step(self, self.frame / self.fps)
         for k in self.cast.waiting.tolist():
-            self._choose(k)
+            if self._lies(k):
+                self.cast.hold(k)
+            else:
+                self._choose(k)
         happened = self.floor.advance()
         self.frame += 1
         self._pass_check_points()
@@ -154,6 +177,11 @@ class BoutScene:
             for landing in self.floor.landings:
                 self._land(landing)
         return True
+
+    def _lies(self, k: int) -> bool:
+        """Whether character k has been knocked down for good."""
+        fighter, stretch = self.settings.fighters[k], self.stretch[k]
+        return fighter.stays_down and self.tree.labels[stretch] == "fall"
 
     # Deciding ------------------------------------------------------------------------------------
 
@@ -174,7 +202,8 @@ class BoutScene:
             float(self.frame),
             (self._landed[k], self._landed[o]),
         )
-        self._set_goals()
+        for p in pair:
+            self._set_goal(p)
         players = (self.players[k], self.players[o])
         decision = self.tree.decide(state, players, tuple(self._recent[k]))
         self.decisions.append(decision)
@@ -193,14 +222,13 @@ class BoutScene:
             jump=bool(cast.jump[k]),
         )
 
-    def _set_goals(self) -> None:
-        seconds = self.frame / self.fps
-        for player, progress, f in zip(self.players, self.progress, self.settings.fighter):
-            if progress is None:
-                continue
-            player.goal = progress.goal(seconds)
-            player.wanted = (*f.wanted, *progress.wanted)
-            player.unwanted = (*f.unwanted, *progress.unwanted)
+    def _set_goal(self, k: int) -> None:
+        player, progress, (wanted, unwanted) = self.players[k], self.progress[k], self._asked[k]
+        if progress is None:
+            return
+        player.goal = progress.goal(self.frame / self.fps)
+        player.wanted = (*wanted, *progress.wanted)
+        player.unwanted = (*unwanted, *progress.unwanted)
 
     def _begin(self, k: int, stretch: int) -> None:
         """Character k begins a stretch now, whatever it does."""
@@ -237,11 +265,49 @@ class BoutScene:
             return
         rules = tree.rules
         size = FALL if speed >= rules.fall_from else int(speed >= rules.stagger_from)
-        response = int(tree.response[int(part in ("head", "neck")), size])
-        if response == NOTHING:
+        row = tree.response[int(part in ("head", "neck"))]
+        self._set_goal(landing.victim)
+        if row[FALL] != NOTHING and tree.asked(self.players[landing.victim])[row[FALL]] > 0:
+            size = FALL  # it is asked for
+        self._react(landing.victim, int(row[size]), size)
+
+    def _react(self, k: int, response: int, size: int) -> None:
+        if response == NOTHING or self._lies(k):
             return
-        self._begin(landing.victim, response)
-        self._event("reaction", landing.victim, action=tree.labels[response], size=SIZES[size])
+        self._begin(k, response)
+        self._event("reaction", k, action=self.tree.labels[response], size=SIZES[size])
+
+    # The story -----------------------------------------------------------------------------------
+
+    def take_cue(self, cue: CueSettings) -> None:
+        """Somebody fights otherwise from their next decision on."""
+        k = self.names.index(cue.who)
+        player = self.players[k]
+        self._kept.setdefault(k, dict(vars(player)))
+        if cue.against is not None:
+            self.floor.opponent[k] = self.names.index(cue.against)
+        if cue.style is not None:
+            player.style = style(cue.style)
+        if cue.depth is not None:
+            player.depth = cue.depth
+        wanted, unwanted = self._asked[k]
+        wanted = wanted if cue.wanted is None else cue.wanted
+        unwanted = unwanted if cue.unwanted is None else cue.unwanted
+        self._asked[k] = player.wanted, player.unwanted = wanted, unwanted
+        route = cue.route()
+        if route is not None:
+            self.progress[k], self._told[k] = Progress(route), 0
+        told = cue.model_dump(exclude={"who", "at", "after", "check_point"}, exclude_none=True)
+        self._event("cue", k, **{name: told[name] for name in told if name != "point"})
+
+    def run_over(self, k: int, by: str, speed: float) -> None:
+        """Character k falls, struck by a vehicle."""
+        self._event("run over", k, by=by, speed=round(speed, 3))
+        self._react(k, int(self.tree.response[0, FALL]), FALL)
+
+    def carry(self, k: int, by: np.ndarray) -> None:
+        """Character k is moved [2] m over the ground."""
+        self.cast.anchor[k, :2] += by
 
     # Check points --------------------------------------------------------------------------------
 

@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from math import radians
+from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from kumite.control import CheckPoint, Route, Style, style
 from kumite.control.game_tree import BOREDOM, DEEPEST, RESTLESSNESS, Player, Rules
-from kumite.control.routes import circle, line, spiral
+from kumite.control.routes import line, spiral
 from kumite.errors import KumiteError
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Metres = Annotated[float, Field(ge=-1000, le=1000)]
+FARTHEST = 1000.0  # m: recordings keep single precision
+Metres = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
 Name = Annotated[str, Field(min_length=1, max_length=60)]
+Depth = Annotated[int, Field(ge=1, le=DEEPEST)]
 
 
-class _Settings(BaseModel):
+class Settings(BaseModel):
+    """What a file may say: no other keys, and nothing changes later."""
+
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class CheckPointSettings(_Settings):
+class CheckPointSettings(Settings):
     """A place to pass, perhaps at a time, perhaps doing something there (B8)."""
 
     place: tuple[Metres, Metres]  # m, x and z
@@ -31,7 +36,12 @@ class CheckPointSettings(_Settings):
     radius: Positive = 0.5  # m within which it is reached
 
 
-class PathSettings(_Settings):
+def check_points(points: tuple[CheckPointSettings, ...]) -> Route | None:
+    """The route along them, if there are any. Errors: times that go back."""
+    return Route(tuple(CheckPoint(**p.model_dump()) for p in points)) if points else None
+
+
+class PathSettings(Settings):
     """Check points along a line, a circle or a spiral."""
 
     shape: Literal["line", "circle", "spiral"]
@@ -42,57 +52,43 @@ class PathSettings(_Settings):
     angle: Finite = 0.0  # degrees, where a circle or spiral begins
     turns: Finite = 1.0
     seconds: Positive | None = None  # for all of it
+    begin: Annotated[Finite, Field(ge=0)] = 0.0  # s, of the first point
     points: Annotated[int, Field(ge=2, le=500)] = 13
     radius: Positive = 0.5  # m within which a point is reached
 
     def route(self) -> Route:
-        angle = self.angle * 3.141592653589793 / 180.0
+        timed = {"seconds": self.seconds, "begin": self.begin}
         if self.shape == "line":
-            return line(
-                self.centre, self.end, self.points, seconds=self.seconds, radius=self.radius
-            )
-        if self.shape == "circle":
-            return circle(
-                self.centre,
-                self.outer,
-                self.turns,
-                self.seconds,
-                self.points,
-                angle=angle,
-                point_radius=self.radius,
-            )
+            return line(self.centre, self.end, self.points, radius=self.radius, **timed)
+        inner = self.outer if self.shape == "circle" else self.inner
         return spiral(
             self.centre,
-            self.inner,
+            inner,
             self.outer,
             self.turns,
-            self.seconds,
-            self.points,
-            angle=angle,
+            points=self.points,
+            angle=radians(self.angle),
             point_radius=self.radius,
+            **timed,
         )
 
 
-class FighterSettings(_Settings):
-    name: Name
-    position: tuple[Metres, Metres]  # m, x and z
-    yaw_deg: Finite = 0.0  # 0 faces +Z
-    against: Name
+class Manner(Settings):
+    """How someone fights."""
+
     style: str | dict[str, str | float] = "boxer"  # a preset, or one with weights changed
-    depth: Annotated[int, Field(ge=1, le=DEEPEST)] = 3
+    depth: Depth = 3
     wanted: tuple[str, ...] = ()  # A⁺, kinds or labels of actions
     unwanted: tuple[str, ...] = ()  # A⁻
     facing_deg: Positive | None = None  # from the opponent at the end, in place of the bout's
     boredom: Annotated[Finite, Field(ge=0)] = BOREDOM
     restlessness: Annotated[Finite, Field(ge=0)] = RESTLESSNESS
-    point: tuple[CheckPointSettings, ...] = ()
-    path: PathSettings | None = None  # before the points
+    stays_down: bool = False  # after a fall
 
     @model_validator(mode="after")
-    def _style_is_one(self) -> FighterSettings:
+    def _style_is_one(self) -> Self:
         try:
             self.weights()
-            self.route()
         except KumiteError as error:
             raise ValueError(str(error)) from None
         return self
@@ -100,15 +96,8 @@ class FighterSettings(_Settings):
     def weights(self) -> Style:
         return style(self.style)
 
-    def route(self) -> Route | None:
-        points = tuple(CheckPoint(**p.model_dump()) for p in self.point)
-        if self.path is None:
-            return Route(points) if points else None
-        route = self.path.route()
-        return route.then(Route(points)) if points else route
-
     def player(self) -> Player:
-        facing = None if self.facing_deg is None else self.facing_deg * 3.141592653589793 / 180.0
+        facing = None if self.facing_deg is None else radians(self.facing_deg)
         return Player(
             self.weights(),
             self.depth,
@@ -120,7 +109,30 @@ class FighterSettings(_Settings):
         )
 
 
-class BoutSettings(_Settings):
+class FighterSettings(Manner):
+    name: Name
+    position: tuple[Metres, Metres]  # m, x and z
+    yaw_deg: Finite = 0.0  # 0 faces +Z
+    against: Name
+    point: tuple[CheckPointSettings, ...] = ()
+    path: PathSettings | None = None  # before the points
+
+    @model_validator(mode="after")
+    def _route_is_one(self) -> FighterSettings:
+        try:
+            self.route()
+        except KumiteError as error:
+            raise ValueError(str(error)) from None
+        return self
+
+    def route(self) -> Route | None:
+        points = check_points(self.point)
+        if self.path is None:
+            return points
+        return self.path.route() if points is None else self.path.route().then(points)
+
+
+class BoutSettings(Settings):
     """What a fight goes by."""
 
     library: Literal["boxing", "sword", "locomotion"] = "boxing"  # of the built-in performer
@@ -133,4 +145,4 @@ class BoutSettings(_Settings):
 
     def rules(self) -> Rules:
         values = self.model_dump(exclude={"library", "facing_deg"})
-        return Rules(facing=self.facing_deg * 3.141592653589793 / 180.0, **values)
+        return Rules(facing=radians(self.facing_deg), **values)

@@ -10,33 +10,35 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from kumite import toml
 from kumite.errors import KumiteError
-from kumite.scene.fighters import BoutSettings, FighterSettings
+from kumite.scene.fighters import (
+    FARTHEST,
+    BoutSettings,
+    FighterSettings,
+    Finite,
+    Metres,
+    Name,
+    Settings,
+)
+from kumite.scene.formation import MOST_PAIRS, PairsSettings
+from kumite.scene.story import CueSettings, VehicleSettings
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-FARTHEST = 1000.0  # m: recordings keep single precision
-Metres = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
-Name = Annotated[str, Field(min_length=1, max_length=60)]
 Weight = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 NEAREST = "nearest"  # aims at the nearest character that is free
 CROWD_SPACING = 1.5  # m between the two of a pair; pairs stand twice as far apart
 
 
-class _Settings(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class CharacterSettings(_Settings):
+class CharacterSettings(Settings):
     name: Name
     position: tuple[Metres, Metres]  # m, x and z
     yaw_deg: Finite = 0.0  # 0 faces +Z
     aims_at: Name  # a character (its head), an object, or "nearest"
     approach: Annotated[Finite, Field(ge=0)] = 1.0  # weights of the behaviours
     strike: Annotated[Finite, Field(ge=0)] = 6.0
-    behaviours: dict[str, Weight] = {}  # weights of others, by name
+    behaviours: dict[str, Weight] = Field(default_factory=dict)  # weights of others, by name
     facing: Annotated[Finite, Field(ge=0)] = 3.5
     few: Annotated[int, Field(ge=1, le=50)] = 3  # drawn from the best few actions
     again: Annotated[int, Field(ge=1, le=50)] = 4  # of the best actions weighed a step further
@@ -53,7 +55,7 @@ def _refuse_no_weight(of: CharacterSettings | CrowdSettings) -> None:
         raise ValueError("all weights are 0; expected approach, strike or another above 0")
 
 
-class ObjectSettings(_Settings):
+class ObjectSettings(Settings):
     name: Name
     position: tuple[Metres, Metres, Metres]  # m
     yaw_deg: Finite = 0.0  # the way it faces, for behaviours that mind it
@@ -61,14 +63,14 @@ class ObjectSettings(_Settings):
     draggable: bool = True
 
 
-class CrowdSettings(_Settings):
+class CrowdSettings(Settings):
     """Characters that stand in pairs all over a square, each with the nearest who is free."""
 
     count: Annotated[int, Field(ge=2, le=1_000_000)] = 30
     spacing: Annotated[Finite, Field(ge=0.8, le=20)] = CROWD_SPACING  # m
     approach: Annotated[Finite, Field(ge=0)] = 1.0
     strike: Annotated[Finite, Field(ge=0)] = 6.0
-    behaviours: dict[str, Weight] = {}
+    behaviours: dict[str, Weight] = Field(default_factory=dict)
     facing: Annotated[Finite, Field(ge=0)] = 3.5
     few: Annotated[int, Field(ge=1, le=50)] = 3
     again: Annotated[int, Field(ge=1, le=50)] = 1  # a crowd decides in a fifth of the time
@@ -116,13 +118,16 @@ class CrowdSettings(_Settings):
         return tuple(out)
 
 
-class SceneSettings(_Settings):
+class SceneSettings(Settings):
     title: Name
     about: str = ""
     character: tuple[CharacterSettings, ...] = ()
     crowd: CrowdSettings | None = None
     fighter: tuple[FighterSettings, ...] = ()  # who fight by game tree
+    pairs: PairsSettings | None = None  # and many more of them, in formation
     bout: BoutSettings | None = None  # what their fight goes by
+    cue: tuple[CueSettings, ...] = ()  # what changes while they fight
+    vehicle: tuple[VehicleSettings, ...] = ()
     object: tuple[ObjectSettings, ...] = ()
 
     @cached_property
@@ -130,16 +135,24 @@ class SceneSettings(_Settings):
         """Those named one by one, then the crowd."""
         return self.character + (self.crowd.characters() if self.crowd else ())
 
+    @cached_property
+    def fighters(self) -> tuple[FighterSettings, ...]:
+        """Those named one by one, then those in formation."""
+        return self.fighter + (self.pairs.fighters() if self.pairs else ())
+
     @model_validator(mode="after")
     def _names_fit(self) -> SceneSettings:
-        if self.fighter:
+        if self.fighter or self.pairs:
             if self.character or self.crowd or self.object:
                 raise ValueError("[[fighter]]s fight among themselves; expected nobody else")
             return self._fit_fighters()
         if not self.character and self.crowd is None:
-            raise ValueError("nobody is in it; expected a [[character]], a [crowd] or [[fighter]]s")
-        if self.bout is not None:
-            raise ValueError("[bout] is of [[fighter]]s; there are none")
+            raise ValueError(
+                "nobody is in it; expected a [[character]], a [crowd], [[fighter]]s or [pairs]"
+            )
+        for part in ("bout", "cue", "vehicle"):
+            if getattr(self, part):
+                raise ValueError(f"[{part}] is of [[fighter]]s; there are none")
         names = [c.name for c in self.characters] + [o.name for o in self.object]
         twice = sorted(n for n, times in Counter(names).items() if times > 1)
         if twice:
@@ -156,40 +169,67 @@ class SceneSettings(_Settings):
 
     def _fit_fighters(self) -> SceneSettings:
         names = self.names
-        twice = sorted({n for n in names if names.count(n) > 1})
+        names = (*names, *(v.name for v in self.vehicle))
+        twice = sorted(n for n, times in Counter(names).items() if times > 1)
         if twice:
             raise ValueError(f"names used twice: {', '.join(twice)}")
-        for f in self.fighter:
-            if f.against == f.name or f.against not in names:
-                others = ", ".join(n for n in names if n != f.name) or "nobody else"
+        known = set(self.names)
+        for f in self.fighters:
+            self._refuse_stranger(f.name, f.against, known)
+        for cue in self.cue:
+            if cue.who not in known:
+                raise ValueError(f"a cue is for {cue.who!r}; expected a fighter")
+            if cue.against is not None:
+                self._refuse_stranger(cue.who, cue.against, known)
+        routed = {f.name: f.route() for f in self.fighters}
+        for moment in (*self.cue, *self.vehicle):
+            if moment.after is None:
+                continue
+            route = routed.get(moment.after)
+            if route is None or not -len(route) <= moment.check_point < len(route):
                 raise ValueError(
-                    f"{f.name} is against {f.against!r}; expected another fighter ({others})"
+                    f"after {moment.after!r} at check point {moment.check_point}; expected a fighter "
+                    "with that check point"
                 )
         return self
+
+    @staticmethod
+    def _refuse_stranger(name: str, against: str, known: set[str]) -> None:
+        if against == name or against not in known:
+            others = ", ".join(sorted(known - {name})) or "nobody else"
+            raise ValueError(f"{name} is against {against!r}; expected another fighter ({others})")
 
     @property
     def names(self) -> tuple[str, ...]:
         """Of all that move by themselves."""
-        return tuple(c.name for c in (*self.characters, *self.fighter))
+        return tuple(c.name for c in (*self.characters, *self.fighters))
 
     @property
     def aims(self) -> dict[str, str]:
         """Whom each aims at that always aims at the same."""
         found = {c.name: c.aims_at for c in self.characters if c.aims_at != NEAREST}
-        return found | {f.name: f.against for f in self.fighter}
+        return found | {f.name: f.against for f in self.fighters}
 
 
 def with_count(settings: SceneSettings, count: int) -> SceneSettings:
-    """The scene with another number of characters in its crowd. Errors: it has none; below 2."""
-    if settings.crowd is None:
+    """The scene with another number of characters in its crowd, or pairs in its formation.
+
+    Errors: it has neither; a number too small or too large.
+    """
+    part = "crowd" if settings.crowd is not None else "pairs"
+    of = getattr(settings, part)
+    if of is None:
         raise KumiteError(
             f"count: {settings.title!r} names its characters one by one; expected a scene with a "
-            "[crowd]"
+            "[crowd] or [pairs]"
         )
-    if count < 2:
-        raise KumiteError(f"count: {count}, expected at least 2")
-    crowd = settings.crowd.model_copy(update={"count": count})
-    return SceneSettings.model_construct(**{**dict(settings), "crowd": crowd})
+    least = 2 if part == "crowd" else 1
+    if count < least:
+        raise KumiteError(f"count: {count}, expected at least {least}")
+    if part == "pairs" and count > MOST_PAIRS:
+        raise KumiteError(f"count: {count} pairs, expected at most {MOST_PAIRS}")
+    changed = of.model_copy(update={"count": count})
+    return SceneSettings.model_construct(**{**dict(settings), part: changed})
 
 
 def builtin_scenes() -> dict[str, SceneSettings]:

@@ -15,12 +15,14 @@ from kumite.scene.recording import Event, Recording
 
 @dataclass
 class SceneObject:
-    """A thing in the scene that is no character: the target to hit."""
+    """A thing in the scene that is no character: a ball to hit, or with a size a box."""
 
     name: str
-    position: np.ndarray  # [3] m, where it is now
+    position: np.ndarray  # [3] m, where its middle is now
     radius: float  # m
     draggable: bool = False
+    size: tuple[float, float, float] | None = None  # m: width, height and length of a box
+    yaw: float = 0.0  # rad, the way a box's length points
 
 
 class Stage(Protocol):

@@ -104,6 +104,10 @@ class Cast:
         """Characters who [W] take actions, stretches [K], from the states they are in."""
         kernels.begin(who, stretch, self.played)
 
+    def hold(self, k: int) -> None:
+        """A character whose action has ended stays as it is for another step."""
+        self.frame[k] = self.stop[k] - 1
+
     def adopt(self, k: int, frame: int, last: int, now: Moment) -> None:
         """Let a character go on from a pose of its own along library frames.
 

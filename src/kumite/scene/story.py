@@ -1,0 +1,187 @@
+"""What happens at a moment of a scene: someone changes opponent or style, a car drives through.
+
+The story lines of Shum et al. 2012 (section VIII-C, figure 11): a strong enemy is "crashed into by
+a car" at the end of the path; the hero "retreats into an alley where an ally joins in".
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Protocol
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from kumite.control import Progress, Route
+from kumite.rotation import planar_apply, planar_inverse
+from kumite.scene.fighters import (
+    CheckPointSettings,
+    Depth,
+    Finite,
+    Manner,
+    Metres,
+    Name,
+    Positive,
+    Settings,
+    check_points,
+)
+from kumite.scene.stage import SceneObject
+
+BRAKE = 8.0  # m/s² of a vehicle that has run somebody over
+CLEAR = 0.25  # m kept before a vehicle by the middle of whom it carries away
+
+
+class Moment(Settings):
+    """When: at a time, or when a fighter has come to a check point."""
+
+    at: Annotated[Finite, Field(ge=0)] | None = None  # s
+    after: Name | None = None
+    check_point: int = -1  # of that fighter's route; -1 is the last
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Moment:
+        if (self.at is None) == (self.after is None):
+            raise ValueError('expected "at", a time, or "after", a fighter at a check point')
+        return self
+
+
+class CueSettings(Moment):
+    """From a moment on somebody fights otherwise. What is not named stays."""
+
+    who: Name
+    against: Name | None = None
+    style: str | dict[str, str | float] | None = None
+    depth: Depth | None = None
+    wanted: tuple[str, ...] | None = None
+    unwanted: tuple[str, ...] | None = None
+    point: tuple[CheckPointSettings, ...] | None = None  # a new route
+
+    def route(self) -> Route | None:
+        return None if self.point is None else check_points(self.point)
+
+    @model_validator(mode="after")
+    def _changes_something(self) -> CueSettings:
+        changes = (self.against, self.style, self.depth, self.wanted, self.unwanted, self.point)
+        if all(c is None for c in changes):
+            raise ValueError("it changes nothing; expected against, style, depth, …")
+        if self.style is not None:
+            Manner(style=self.style)  # raises what is wrong with it
+        return self
+
+
+class VehicleSettings(Moment):
+    """A box that drives from a place to another from a moment on, and runs down whom it meets."""
+
+    name: Name
+    size: tuple[Positive, Positive, Positive] = (1.8, 1.5, 4.2)  # m: width, height, length
+    start: tuple[Metres, Metres]
+    end: tuple[Metres, Metres]
+    speed: Annotated[Finite, Field(gt=0, le=60)] = 10.0  # m/s
+
+    @model_validator(mode="after")
+    def _goes_somewhere(self) -> VehicleSettings:
+        if self.start == self.end:
+            raise ValueError("start and end are the same; expected a way")
+        return self
+
+
+class Actors(Protocol):
+    """What a story needs of a scene."""
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
+    @property
+    def root_position(self) -> np.ndarray: ...
+    @property
+    def progress(self) -> list[Progress | None]: ...
+    def take_cue(self, cue: CueSettings) -> None:
+        """Somebody fights otherwise from now on."""
+        ...
+
+    def run_over(self, k: int, by: str, speed: float) -> None:
+        """Character k falls."""
+        ...
+
+    def carry(self, k: int, by: np.ndarray) -> None:
+        """Character k is moved [2] m over the ground."""
+        ...
+
+
+class Story:
+    """The cues and vehicles of a scene, and how far they are."""
+
+    def __init__(
+        self, cues: tuple[CueSettings, ...], vehicles: tuple[VehicleSettings, ...], fps: float
+    ) -> None:
+        self._cues = list(cues)
+        self._dt = 1.0 / fps
+        self.vehicles = [Vehicle(v) for v in vehicles]
+
+    @property
+    def objects(self) -> list[SceneObject]:
+        return [v.body for v in self.vehicles]
+
+    def step(self, scene: Actors, seconds: float) -> None:
+        """A frame on: what is due begins, vehicles move."""
+        for cue in [c for c in self._cues if _has_come(c, scene, seconds)]:
+            self._cues.remove(cue)
+            scene.take_cue(cue)
+        for vehicle in self.vehicles:
+            vehicle.drives = vehicle.drives or _has_come(vehicle.settings, scene, seconds)
+            if vehicle.drives:
+                vehicle.step(scene, self._dt)
+
+
+def _has_come(moment: Moment, scene: Actors, seconds: float) -> bool:
+    if moment.at is not None:
+        return seconds >= moment.at
+    assert moment.after is not None
+    progress = scene.progress[scene.names.index(moment.after)]
+    if progress is None:
+        return False
+    index = moment.check_point % len(progress.route)
+    return progress.index > index or (progress.index == index and progress.arrived is not None)
+
+
+class Vehicle:
+    """A box on its way."""
+
+    def __init__(self, settings: VehicleSettings) -> None:
+        self.settings = settings
+        self.drives = False
+        self.speed = settings.speed
+        way = np.subtract(settings.end, settings.start)
+        self.length = float(np.linalg.norm(way))
+        self.ahead = way / self.length
+        self.yaw = float(np.arctan2(way[0], way[1]))
+        self.driven = 0.0  # m
+        self._struck: set[int] = set()
+        width, height, length = settings.size
+        self.body = SceneObject(
+            settings.name, self._middle(), 0.5 * length, size=(width, height, length), yaw=self.yaw
+        )
+
+    def _middle(self) -> np.ndarray:
+        x, z = np.asarray(self.settings.start) + self.driven * self.ahead
+        return np.array([x, 0.5 * self.settings.size[1], z])
+
+    def step(self, scene: Actors, dt: float) -> None:
+        """Move on; who is in the way is run down and carried along, and it brakes."""
+        if self._struck:
+            self.speed = max(self.speed - BRAKE * dt, 0.0)
+        self.driven = min(self.driven + self.speed * dt, self.length)
+        self.body.position = self._middle()
+        moving = self.speed > 0.0 and self.driven < self.length
+        width, height, length = self.settings.size
+        here = np.array([self.body.position[0], self.body.position[2], self.yaw])
+        seen = planar_apply(planar_inverse(here), scene.root_position)
+        front = 0.5 * length + CLEAR
+        inside = (
+            (np.abs(seen[:, 0]) < 0.5 * width + CLEAR)
+            & (np.abs(seen[:, 2]) < front)
+            & (seen[:, 1] < height)
+        )
+        for k in np.flatnonzero(inside & moving).tolist():
+            if k not in self._struck:
+                self._struck.add(k)
+                scene.run_over(k, self.settings.name, self.speed)
+            scene.carry(k, (front - seen[k, 2]) * self.ahead)
