@@ -102,7 +102,7 @@ class Toy:
             for m in moves
         ]
         weights = np.stack([side.style.as_array() for side in self.sides])
-        asked, goal = np.zeros((2, len(moves))), np.zeros((2, 2))
+        asked, goal = np.zeros((2, len(moves))), np.zeros((2, 1, 2))
         for p, side in enumerate(self.sides):
             for move, sign in side.asked.items():
                 asked[p, move] = sign
@@ -148,6 +148,8 @@ class Toy:
             suits.astype(np.float32),
             asked,
             goal,
+            0.0,
+            1.0,
             np.array(self.response, np.int64),
             tired,
         )

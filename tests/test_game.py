@@ -495,7 +495,7 @@ def test_bounds_do_not_change_the_answer_of_a_real_boxer(boxer_tree: GameTree):
 @pytest.mark.parametrize("threads", [1, 2])
 def test_the_same_bytes_whatever_the_number_of_threads(performer_tree: GameTree, threads: int):
     tree, before = performer_tree, numba.get_num_threads()
-    players = Player(STYLES["boxer_path"], wanted=("attack",), goal=(1.0, 2.0)), Player()
+    players = Player(STYLES["boxer_path"], wanted=("attack",), goal=np.array([1.0, 2.0])), Player()
     game = tree.game(players)
     state = some_start(tree, np.random.default_rng(8))
     serial = SEARCH.serial(game, state, 3, tree.most, False)

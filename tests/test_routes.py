@@ -72,10 +72,39 @@ def test_what_is_missed_is_told_with_when_and_by_how_much():
         (2, 8.0, 1.0),
         (3, None, pytest.approx(np.hypot(6.0, 1.0))),
     ]
-    # It is still the goal; late is told when it comes after all.
-    assert progress.goal(9.0) == (0.0, 4.0)
-    late = progress.update((0.0, 4.0), 9.0)
-    assert late is not None and late.late_by == 7.0
+    # Late is told when it comes after all, before the next one's time.
+    assert progress.goal(7.0) == (0.0, 4.0)
+    late = progress.update((0.0, 4.0), 7.5)
+    assert late is not None and late.late_by == 5.5 and progress.given_up == []
+
+
+def test_who_is_too_late_gives_a_check_point_up_for_the_next():
+    points = [CheckPoint((float(k), 0), time=float(k)) for k in range(4)]
+    progress = Progress(Route((*points, CheckPoint((9, 0), time=9.0, require=("duck",)))))
+    progress.update((0.0, 0.0), 0.0)
+    assert progress.update((0.2, 0.0), 2.5) is None
+    assert progress.index == 2 and progress.given_up == [Missed(1, 1.0, 0.8, False, ())]
+    assert progress.missed(2.5) == (Missed(1, 1.0, 0.8, False, ()), Missed(2, 2.0, 1.8, False, ()))
+    found = progress.update((2.8, 0.0), 3.0)  # two are given up, the third is not far
+    assert found is not None and found.index == 3 and progress.index == 4
+    progress.update((3.0, 0.0), 99.0)
+    assert progress.index == 4  # something is to be done there
+
+
+def test_where_to_be_moves_at_an_even_pace_between_times():
+    points = (
+        CheckPoint((0, 0), time=1.0),
+        CheckPoint((2, 0), time=2.0),
+        CheckPoint((2, 4), time=4.0, require=("duck",)),
+        CheckPoint((0, 4), time=5.0),
+    )
+    progress = Progress(Route(points))
+    where = [[0, 0], [0, 0], [1, 0], [2, 0], [2, 1], [2, 2], [2, 3], [2, 4], [2, 4]]
+    assert progress.ahead(0.5, 0.5, 12).tolist() == [*where, [2, 4], [2, 4], [2, 4]]
+    assert Progress(Route((CheckPoint((3, 1)),))).ahead(0.0, 1.0, 2).tolist() == [[3, 1], [3, 1]]
+    for k in range(4):
+        progress.update(points[k].place, float(points[k].time or 0), {"duck"})
+    assert progress.ahead(4.5, 0.5, 2).tolist() == [[1, 4], [0, 4]]
 
 
 def test_one_update_does_one_check_point():
@@ -215,14 +244,17 @@ def test_check_points_are_done_in_order_and_never_early(points, walk, radius):
         found = progress.update((x, z), float(time), {"duck"} if ducks else ())
         assert found is None or (found.left == time and found.time <= time)
         assert progress.goal(float(time)) in [p.place for p in route.points]
-    assert [r.index for r in progress.reached] == list(range(progress.index))
+    given_up = [m.index for m in progress.given_up]
+    assert sorted([r.index for r in progress.reached] + given_up) == list(range(progress.index))
+    assert not any(route.points[k].require for k in given_up)
     assert all(a.left < b.left for a, b in zip(progress.reached, progress.reached[1:]))
     for r in progress.reached:
         due = route.points[r.index].time
         assert r.late_by == (0.0 if due is None else r.left - due) and r.late_by >= 0
         assert r.distance <= radius
     left = progress.missed()
-    assert [m.index for m in left] == list(range(progress.index, len(route)))
+    assert [m.index for m in left] == [*given_up, *range(progress.index, len(route))]
     if walk:
         nearest = np.min([np.hypot(*(route.places - (x, z)).T) for x, z, _ in walk], axis=0)
-        assert np.allclose([m.distance for m in left], nearest[progress.index :])
+        now = [m.distance for m in left[len(given_up) :]]
+        assert np.allclose(now, nearest[progress.index :])

@@ -11,10 +11,11 @@ from kumite.annotate.actions import (
     Actions,
     ActionSettings,
     find_actions,
+    shorter_rests,
 )
 from kumite.annotate.contacts import Contacts, find_contacts
 from kumite.annotate.likeness import Likeness, measure_likeness
-from kumite.annotate.strikes import Strikes, find_strikes
+from kumite.annotate.strikes import Strikes, find_strikes, only_blows
 
 __all__ = [
     "DIRECTIONS",
@@ -30,6 +31,8 @@ __all__ = [
     "find_contacts",
     "find_strikes",
     "measure_likeness",
+    "only_blows",
     "read_actions",
+    "shorter_rests",
     "write_actions",
 ]

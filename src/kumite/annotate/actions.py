@@ -89,6 +89,23 @@ class Actions:
         return np.searchsorted(self.clip_start, self.start, side="right") - 1
 
 
+def shorter_rests(actions: Actions, longest: float) -> Actions:
+    """The same actions, but whoever rests longer than 1.5 times so many frames may go on between.
+
+    A rest is cut into equal parts of about ``longest``: to choose one is not to sleep through it.
+    """
+    idle = actions.kind == KINDS.index("idle")
+    frames = actions.stop - actions.start
+    parts = np.where(idle & (frames > 1.5 * longest), np.rint(frames / longest), 1).astype(np.int64)
+    of = np.repeat(np.arange(len(actions)), parts)
+    part = np.arange(len(of)) - np.repeat(np.cumsum(parts) - parts, parts)
+    start = actions.start[of] + part * frames[of] // parts[of]
+    stop = actions.start[of] + (part + 1) * frames[of] // parts[of]
+    kind, limb, direction = actions.kind[of], actions.limb[of], actions.direction[of]
+    label = tuple(actions.label[a] for a in of.tolist())
+    return Actions(start, stop, kind, limb, direction, label, actions.clip_start)
+
+
 @dataclass(frozen=True)
 class ActionSettings:
     """How actions are cut and told."""

@@ -9,7 +9,7 @@ such frames, told by its fastest frame, so that blows can be counted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -65,6 +65,17 @@ class Strikes:
     def points(self) -> np.ndarray:
         """Effective hitting points [P, 3]: the tip at each effective frame, in its facing frame."""
         return self.tip[self.effective]
+
+
+def only_blows(strikes: Strikes, keep: np.ndarray) -> Strikes:
+    """The strikes without the blows that are not kept [X] bool: arms swing in running, too."""
+    effective = np.zeros_like(strikes.effective)
+    for x in np.flatnonzero(keep).tolist():
+        inside = slice(int(strikes.start[x]), int(strikes.stop[x]))
+        effective[inside, strikes.limb[x]] = strikes.effective[inside, strikes.limb[x]]
+    rows = ("frame", "start", "stop", "limb", "velocity")
+    kept = {name: getattr(strikes, name)[keep] for name in rows}
+    return replace(strikes, effective=effective, **kept)
 
 
 def find_strikes(

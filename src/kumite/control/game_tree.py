@@ -36,6 +36,7 @@ DEEPEST = 6  # levels; a seventh would take hours
 BOREDOM = 1e5  # score that an action loses for each recent use: a blow of 1 m/s
 RESTLESSNESS = 30.0  # score that an action loses for each recent one of its kind
 MEMORY = 8  # actions back that "recently" goes
+GOAL_EVERY = 0.25  # s
 COOPERATIVE = [HEADING, PLACE, REQUIREMENT]  # columns of weights
 
 
@@ -66,7 +67,7 @@ class Player:
     depth: int = 3  # levels of the tree
     wanted: tuple[str, ...] = ()  # A⁺, kinds or labels of actions
     unwanted: tuple[str, ...] = ()  # A⁻
-    goal: tuple[float, float] | None = None  # m, the next check point
+    goal: np.ndarray | None = None  # [G, 2] m, where to be now and every GOAL_EVERY s
     facing: float | None = None  # rad, in place of the rules' own
     boredom: float = BOREDOM  # score that an action loses for each recent use (B11)
     restlessness: float = RESTLESSNESS  # and for each recent one of its kind
@@ -212,8 +213,12 @@ class GameTree:
             ]
         return out
 
-    def game(self, players: tuple[Player, Player], recent: tuple[int, ...] = ()) -> kernels.Game:
-        """What the search needs besides the state; recent: stretches that the first used lately."""
+    def game(
+        self, players: tuple[Player, Player], recent: tuple[int, ...] = (), now: float = 0.0
+    ) -> kernels.Game:
+        """What the search needs besides the state; recent: stretches that the first used lately;
+        now: the time [frames], from which goals count.
+        """
         r, fps = self.rules, self.library.clips.fps
         vulnerable = np.array(
             [VULNERABILITY["head" if p == "head" else "torso"] for p in TRUNK]
@@ -231,13 +236,16 @@ class GameTree:
             vulnerable,
         )
         weights = np.stack([p.style.as_array() for p in players])
-        goal = np.zeros((2, 2))
+        goals = [
+            np.zeros((1, 2)) if p.goal is None else np.reshape(p.goal, (-1, 2)) for p in players
+        ]
+        goal = np.zeros((2, max(len(g) for g in goals), 2))
         asked = np.stack([self.asked(p) for p in players])
         for p, player in enumerate(players):
+            goal[p, : len(goals[p])] = goals[p]
+            goal[p, len(goals[p]) :] = goals[p][-1]
             if player.goal is None:
                 weights[p, kernels.PLACE] = 0.0
-            else:
-                goal[p] = player.goal
             if not asked[p].any():
                 weights[p, REQUIREMENT] = 0.0
         return kernels.Game(
@@ -247,6 +255,8 @@ class GameTree:
             self.suits,
             asked,
             goal,
+            float(now),
+            GOAL_EVERY * fps,
             self.response,
             self._tired(players[0], recent),
         )
@@ -273,7 +283,8 @@ class GameTree:
         search skips what cannot change the choice (``bounds``); nodes are those looked at.
         """
         begin = time.perf_counter()
-        game = self.game(players, recent)
+        now = min(state[kernels.END], state[kernels.FIELDS + kernels.END])
+        game = self.game(players, recent, now)
         bounds = bounds and not np.any(game.weights[:, COOPERATIVE])
         run = SEARCH.serial if bounds or players[0].depth < 3 else SEARCH.parallel
         found = run(game, state, players[0].depth, self.most, bounds)

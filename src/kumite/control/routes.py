@@ -120,6 +120,7 @@ class Progress:
         self.lacking = route.points[0].require  # of its actions, those not performed yet
         self.closest = np.full(len(route), np.inf)  # [points] m
         self.reached: list[Reached] = []
+        self.given_up: list[Missed] = []
         self._places = route.places
         self._distance = 0.0
 
@@ -133,6 +134,9 @@ class Progress:
         """Where (x, z) the character is at a time [s], and what it has performed since the last
         update: labels, ways and kinds. The check point that is done by it, if any: one at most.
 
+        Who has not come to a check point when the next one's time is due gives it up and goes
+        there, unless something was to be performed at it.
+
         Actions count from the update at which it is there; from then on it may be moved away by
         what it performs.
         """
@@ -141,6 +145,7 @@ class Progress:
         np.minimum(self.closest, distance, out=self.closest)
         if self.done:
             return None
+        self._give_up(time)
         point = self.route.points[self.index]
         if self.arrived is None and distance[self.index] <= point.radius:
             self.arrived, self._distance = time, float(distance[self.index])
@@ -152,9 +157,31 @@ class Progress:
         late = 0.0 if point.time is None else time - point.time
         found = Reached(self.index, self.arrived, time, late, self._distance)
         self.reached.append(found)
+        self._go_on()
+        return found
+
+    def _go_on(self) -> None:
         self.index, self.arrived = self.index + 1, None
         self.lacking = () if self.done else self.route.points[self.index].require
-        return found
+
+    def _give_up(self, time: float) -> None:
+        points = self.route.points
+        while self.arrived is None and self.index + 1 < len(points):
+            point, then = points[self.index], points[self.index + 1]
+            if point.require or point.time is None or then.time is None or time < then.time:
+                return
+            self.given_up.append(self._miss(self.index))
+            self._go_on()
+
+    def _miss(self, k: int) -> Missed:
+        point, current = self.route.points[k], k == self.index
+        return Missed(
+            k,
+            point.time,
+            float(self.closest[k]),
+            current and self.arrived is not None,
+            self.lacking if current else point.require,
+        )
 
     def goal(self, time: float) -> tuple[float, float]:
         """Where (x, z) to go at a time [s], now or later, as far as is known now.
@@ -169,6 +196,29 @@ class Progress:
         if waits and (due is None or time >= due) and k + 1 < len(points):
             k += 1
         return points[k].place
+
+    def ahead(self, time: float, step: float, count: int) -> np.ndarray:
+        """Where to be [count, 2] at a time [s] and every ``step`` after it, as far as is known now.
+
+        Between check points with times at an even pace; where one has none, at it until it is
+        reached. Nobody is to be farther than where something is still to be performed.
+        """
+        out = np.tile(np.array(self.goal(time)), (count, 1))
+        k, points = min(self.index, len(self.route) - 1), self.route.points
+        begin = k = k - 1 if k > 0 and points[k - 1].time is not None else k
+        while (
+            k + 1 < len(points)
+            and points[k + 1].time is not None
+            and not (k >= self.index and points[k].require and (k > self.index or self.lacking))
+        ):
+            k += 1
+        if k == begin or points[begin].time is None:
+            return out
+        at = time + step * np.arange(count)
+        times = np.array([p.time for p in points[begin : k + 1]], dtype=float)
+        for axis in range(2):
+            out[:, axis] = np.interp(at, times, self._places[begin : k + 1, axis])
+        return out
 
     @property
     def wanted(self) -> tuple[str, ...]:
@@ -185,20 +235,12 @@ class Progress:
 
         Without a time, at the end of a scene: all that are not done.
         """
-        out = []
-        for k in range(self.index, len(self.route)):
-            point, current = self.route.points[k], k == self.index
-            if time == NEVER or (point.time is not None and point.time <= time):
-                out.append(
-                    Missed(
-                        k,
-                        point.time,
-                        float(self.closest[k]),
-                        current and self.arrived is not None,
-                        self.lacking if current else point.require,
-                    )
-                )
-        return tuple(out)
+        due = [
+            self._miss(k)
+            for k in range(self.index, len(self.route))
+            if time == NEVER or (at := self.route.points[k].time) is not None and at <= time
+        ]
+        return (*self.given_up, *due)
 
 
 # Shapes ------------------------------------------------------------------------------------------

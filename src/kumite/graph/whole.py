@@ -16,7 +16,15 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial.distance import squareform
 
-from kumite.annotate import KINDS, Actions, find_actions, find_contacts, find_strikes
+from kumite.annotate import (
+    KINDS,
+    Actions,
+    find_actions,
+    find_contacts,
+    find_strikes,
+    only_blows,
+    shorter_rests,
+)
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError
 from kumite.graph.distance import pose_features
@@ -27,6 +35,7 @@ from kumite.rotation import planar_compose, planar_inverse
 
 ALIKE = 1.2  # rad: poses of one cluster are nearer than that, on average (root of D)
 MOST_WAYS = 64  # actions that a state offers: each kind of label's best joins, turn by turn
+REST = 0.7  # s: longer rests are offered in parts
 _SPARE = 8  # rows that the kernel may write beyond the last
 
 
@@ -56,6 +65,12 @@ def build_action_library(
         actions = find_actions(clips, contacts, strikes)
     elif not np.array_equal(actions.clip_start, clips.clip_start):
         raise KumiteError("actions: of other clips")
+    actions = shorter_rests(actions, REST * clips.fps)
+    attack = np.flatnonzero(actions.kind == KINDS.index("attack"))
+    which = np.searchsorted(actions.start[attack], strikes.frame, side="right") - 1
+    strikes = only_blows(
+        strikes, (which >= 0) & (strikes.frame < np.append(actions.stop[attack], 0)[which])
+    )
     progress("clustering postures")
     # An action is entered from the frame before it, where its clip has one: then what follows in
     # the capture follows here without a join.

@@ -88,7 +88,9 @@ class Want(NamedTuple):
     weights: np.ndarray  # [2, style.COLUMNS]
     suits: np.ndarray  # [L, L] float32, S of one's own stretch against the opponent's
     asked: np.ndarray  # [2, L] 1 in A⁺, -1 in A⁻, else 0
-    goal: np.ndarray  # [2, 2] m, the next check point
+    goal: np.ndarray  # [2, G, 2] m, where to be now and every so many frames later; then as last
+    goal_from: float  # frames, now
+    goal_every: float  # frames
     response: np.ndarray  # [2, SIZES] stretches of reactions to the trunk and the head, or NOTHING
     tired: np.ndarray  # [L] what it costs the searcher to begin a stretch: it did the like lately
 
@@ -133,7 +135,16 @@ def parts(game):
             game.fall_from,
             game.vulnerable,
         ),
-        Want(game.weights, game.suits, game.asked, game.goal, game.response, game.tired),
+        Want(
+            game.weights,
+            game.suits,
+            game.asked,
+            game.goal,
+            game.goal_from,
+            game.goal_every,
+            game.response,
+            game.tired,
+        ),
     )
 
 
@@ -431,7 +442,9 @@ def movement(state, p, moves, want):
     comp = -weights[FACING] * off * off - weights[DISTANCE] * (r - weights[PREFERRED_DISTANCE]) ** 2
     coop = 0.0
     if weights[PLACE] != 0.0:
-        coop -= weights[PLACE] * ((want.goal[p, 0] - x) ** 2 + (want.goal[p, 1] - z) ** 2)
+        g = int((time - want.goal_from) / want.goal_every + 0.5)
+        g = min(max(g, 0), want.goal.shape[1] - 1)
+        coop -= weights[PLACE] * ((want.goal[p, g, 0] - x) ** 2 + (want.goal[p, g, 1] - z) ** 2)
     if weights[HEADING] != 0.0:
         turned = wrapped(yaw - weights[PREFERRED_HEADING])
         coop -= weights[HEADING] * turned * turned

@@ -193,12 +193,17 @@ _LEAP = {
     "heel": ((0.22, (26, 26)), (0.36, (32, 32)), (0.56, (6, 6))),
 }  # fmt: skip
 
+_LEFTWARD = (Step("left", 0.06, 0.38, 0.06), Step("right", 0.42, 0.78, 0.06))
+_RIGHTWARD = (Step("right", 0.06, 0.38, 0.06), Step("left", 0.42, 0.78, 0.06))
+
 MOVES: tuple[Move, ...] = (
     Move(
         "stand", "idle", 2.2,
         {"pelvis": ((0.7, (0.02, -0.004, 0.0)), (1.6, (-0.015, -0.004, 0.0))),
          "chest_turn": ((0.8, (2, 0, 0)), (1.6, (-2, 0, 0))), "head_turn": ((0.7, (8, 1, 0)), (1.5, (-7, -1, 0)))},
     ),
+    Move("turn_left", "transition", 0.95, {"head_turn": ((0.2, (18, 0, 0)),)}, _LEFTWARD, (0, 0, 50)),
+    Move("turn_right", "transition", 0.95, {"head_turn": ((0.2, (-18, 0, 0)),)}, _RIGHTWARD, (0, 0, -50)),
     *_GAITS,
     *(_from_stand(g, f"{g.label}_start") for g in _GAITS if "turn" not in g.label),
     *(_to_stand(g, f"{g.label}_stop") for g in _GAITS if "turn" not in g.label),
@@ -237,6 +242,7 @@ LOCOMOTION = Style(
             _trip("run", "run", "run", "run_turn_left", "run_turn_left", "run", "run_turn_right",
                   "run_turn_right", "run", "run_turn_left", "run_turn_right", "run")
         ),
+        "turns": Take(("stand", "turn_left", "turn_right"), 16),
         "leaps": Take(("stand", "leap_left", "leap_right", "leap_right", "leap_left"), 14),
     },
     vault=7,

@@ -13,7 +13,7 @@ import numpy as np
 from kumite.body import ARMS
 from kumite.clip import LIMBS
 from kumite.control import Progress, style
-from kumite.control.game_tree import MEMORY, Decision, GameTree, Player
+from kumite.control.game_tree import GOAL_EVERY, MEMORY, Decision, GameTree, Player
 from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.kernels.blow import NO_BLOW
@@ -26,6 +26,7 @@ from kumite.scene.stage import SceneObject
 from kumite.scene.story import CueSettings, Story
 
 RECOIL = 0.018  # m that a struck segment gives way per m/s of the blow
+GOALS = 25  # places ahead of which a fighter knows: 6 s
 SIZES = {FLINCH: "flinch", STAGGER: "stagger", FALL: "fall"}
 
 
@@ -68,7 +69,8 @@ class BoutScene:
         self.fps = library.clips.fps
         self.skeleton = library.clips.skeleton
         self.names = settings.names
-        self.tree = GameTree(library, (settings.bout or BoutSettings()).rules())
+        self.bout = settings.bout or BoutSettings()
+        self.tree = GameTree(library, self.bout.rules())
         self.players = [f.player() for f in settings.fighters]
         self._kept: dict[int, dict] = {}  # players as they were before a cue changed them
         self._check_names()
@@ -140,8 +142,11 @@ class BoutScene:
         self._done: list[set[str]] = [set() for _ in range(count)]
         self._told = [0] * count
         self._landed = [NO_BLOW] * count  # the blow each has landed last in what it is doing
+        bout = self.bout
+        spread = np.array([bout.scatter, bout.scatter, np.radians(bout.scatter_deg)])
+        moved = rng.uniform(-1.0, 1.0, (count, 3)) * spread
         for k, f in enumerate(self.settings.fighters):
-            facing = np.array([*f.position, np.radians(f.yaw_deg)])
+            facing = np.array([*f.position, np.radians(f.yaw_deg)]) + moved[k]
             cast.place(k, int(table.target[self.stretch[k]]), facing)
         self.floor.start()
 
@@ -226,7 +231,7 @@ class BoutScene:
         player, progress, (wanted, unwanted) = self.players[k], self.progress[k], self._asked[k]
         if progress is None:
             return
-        player.goal = progress.goal(self.frame / self.fps)
+        player.goal = progress.ahead(self.frame / self.fps, GOAL_EVERY, GOALS)
         player.wanted = (*wanted, *progress.wanted)
         player.unwanted = (*unwanted, *progress.unwanted)
 

@@ -140,9 +140,13 @@ class BoutSettings(Settings):
     attack_range: Positive = 1.0  # m
     defence_range: Positive = 3.0  # m
     catch: Annotated[Finite, Field(ge=0)] = 0.0  # m; 0: nobody is caught
+    scatter: Annotated[Finite, Field(ge=0, le=10)] = (
+        0.0  # m by which the seed moves who begins where
+    )
+    scatter_deg: Annotated[Finite, Field(ge=0, le=180)] = 0.0  # and turns them
     stagger_from: Positive = 5.2  # m/s of a blow
     fall_from: Positive = 10.0  # m/s
 
     def rules(self) -> Rules:
-        values = self.model_dump(exclude={"library", "facing_deg"})
+        values = self.model_dump(exclude={"library", "facing_deg", "scatter", "scatter_deg"})
         return Rules(facing=radians(self.facing_deg), **values)

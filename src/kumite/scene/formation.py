@@ -28,13 +28,13 @@ class MemberSettings(Manner):
     name: Name
     require: tuple[str, ...] = ()  # at the last check point: kinds or labels of actions
     refuse: tuple[str, ...] = ()  # before it
-    behind: Annotated[Finite, Field(ge=0, le=20)] = 0.0  # m that it follows behind on the path
-    lead: Annotated[Finite, Field(ge=0, le=60)] = 0.0  # s that it passes check points later
+    later: Annotated[Finite, Field(ge=0, le=60)] = 0.0  # s after its path's times
 
 
 class PairsSettings(Settings):
     """Pairs whose paths are laid out so that no two of them meet.
 
+    facing: whether those of a pair face each other when they begin, or along their way.
     spiral: rings of pairs all round a centre, that turn and spread. crossing: half of the pairs go
     along +X, the others along +Z, so timed that wherever two paths cross the second pair comes
     ``spacing`` / ``speed`` later.
@@ -47,6 +47,7 @@ class PairsSettings(Settings):
     seconds: Annotated[Finite, Field(gt=0, le=3600)] = 30.0
     points: Annotated[int, Field(ge=2, le=200)] = 13
     radius: Positive = 0.7  # m within which a check point is reached
+    facing: Literal["rival", "way"] = "rival"
     turn_deg: Annotated[Finite, Field(ge=-3600, le=3600)] = 40.0  # of a spiral
     one: MemberSettings
     other: MemberSettings
@@ -100,19 +101,24 @@ class PairsSettings(Settings):
         out = []
         for side, member in zip((0.5, -0.5), members):
             rival = members[1] if member is members[0] else members[0]
-            here = places[0] + side * APART * tangent - member.behind * tangent
+            if self.facing == "rival":
+                here, way = places[0] + side * APART * tangent, -np.sign(side) * tangent
+            else:  # as far behind as it follows later
+                here, way = places[0] - self.speed * member.later * tangent, tangent
             last = self.points - 1
+            begin = CheckPointSettings(
+                place=(float(here[0]), float(here[1])), time=float(times[0]), radius=self.radius
+            )
             point = tuple(
                 CheckPointSettings(
                     place=(float(p[0]), float(p[1])),
-                    time=float(t + member.lead),
+                    time=float(t + member.later),
                     require=member.require if n == last else (),
                     refuse=member.refuse if n < last else (),
                     radius=self.radius,
                 )
                 for n, (p, t) in enumerate(zip(places, times))
             )
-            way = -tangent if side > 0 else tangent
             manner = {key: getattr(member, key) for key in Manner.model_fields}
             out.append(
                 FighterSettings(
@@ -121,7 +127,7 @@ class PairsSettings(Settings):
                     position=(float(here[0]), float(here[1])),
                     yaw_deg=float(np.degrees(np.arctan2(way[0], way[1]))),
                     against=f"{rival.name} {k + 1}",
-                    point=point,
+                    point=(begin, *point) if self.facing == "way" and member.later else point,
                 )
             )
         return out
