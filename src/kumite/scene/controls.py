@@ -15,16 +15,16 @@ from kumite.errors import KumiteError
 SPANS = {  # least, most, step of what may be tuned; angles in degrees
     "depth": (1, 5, 1),
     "preferred_distance": (0, 4, 0.1),
-    "distance": (0, 1e3, 10),
+    "distance": (0, 1e3, 1),
     "preferred_facing": (-180, 180, 5),
-    "facing": (0, 1e3, 10),
+    "facing": (0, 1e3, 1),
     "given_short": (0, 1e5, 1e3),
     "given_long": (0, 1e5, 1e3),
     "taken": (0, 1e5, 1e3),
-    "suitability": (0, 1e3, 10),
+    "suitability": (0, 1e3, 1),
     "preferred_heading": (-180, 180, 5),
-    "heading": (0, 1e3, 10),
-    "place": (0, 1e3, 10),
+    "heading": (0, 1e3, 1),
+    "place": (0, 1e5, 10),
     "requirement": (0, 1e7, 1e5),
     "boredom": (0, 2e5, 1e3),
     "restlessness": (0, 1e3, 10),
@@ -102,16 +102,12 @@ def check_orders(who: str, tree: GameTree, player: Player, route: Route | None) 
     """Errors: names that no action has, of the player or at a check point; nothing is left to
     choose, by itself or on the way to one.
     """
-    places = (
-        [("", (), ())]
-        if route is None
-        else [("", (), ())]
-        + [
-            (f" at check point {k}", p.require, p.refuse)
-            for k, p in enumerate(route.points)
-            if p.require or p.refuse
-        ]
-    )
+    places: list[tuple[str, tuple[str, ...], tuple[str, ...]]] = [("", (), ())]
+    places += [
+        (f" at check point {k}", p.require, p.refuse)
+        for k, p in enumerate(route.points if route else ())
+        if p.require or p.refuse
+    ]
     for where, require, refuse in places:
         try:
             tree.allowed(player)

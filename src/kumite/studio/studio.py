@@ -6,6 +6,7 @@ under one lock and leave notes (``_redraw``, ``_rewound``) that the loop acts on
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 import threading
@@ -208,7 +209,8 @@ class Studio:
         """Put a check point where a ray of the page meets the floor."""
         place, fight = on_floor(self.from_page(eye), way), self._fight
         if place is not None and fight is not None and self._sketch.who != who:
-            self.direct(lambda: fight.move_check_point(fight.names[who], index, place))
+            with contextlib.suppress(KumiteError):  # its path may have been cleared meanwhile
+                self.direct(lambda: fight.move_check_point(fight.names[who], index, place))
 
     def move_object(self, name: str, position: np.ndarray) -> None:
         """Put an object at ``position`` [3] m."""
