@@ -35,7 +35,13 @@ ARGUMENTS = (
     "--disable-sync",
     "--disable-dev-shm-usage",
 )
-HARMLESS = ("GPU stall", "GL Driver Message", "Download the React DevTools", "[Performance]")
+HARMLESS = (
+    "GPU stall",
+    "GL Driver Message",
+    "Download the React DevTools",
+    "[Performance]",
+    "Unable to preventDefault inside passive event listener",  # the viewer's own, of a drag
+)
 
 
 @dataclass

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from kumite.control import routes
 from kumite.control.routes import CheckPoint, Missed, Progress, Reached, Route, circle, line, spiral
 from kumite.errors import KumiteError
 
@@ -258,3 +259,32 @@ def test_check_points_are_done_in_order_and_never_early(points, walk, radius):
         nearest = np.min([np.hypot(*(route.places - (x, z)).T) for x, z, _ in walk], axis=0)
         now = [m.distance for m in left[len(given_up) :]]
         assert np.allclose(now, nearest[progress.index :])
+
+
+def test_through_places_at_one_speed():
+    route = routes.through([(0, 0), (3, 0), (3, 1)], 8.0)
+    assert [p.time for p in route.points] == [0.0, 6.0, 8.0]
+    route = routes.through([(0, 0), (3, 0), (3, 1)], 10.0, start=(0, -4))
+    assert [p.time for p in route.points] == [5.0, 8.75, 10.0]
+    assert [p.time for p in route.later(2.0).points] == [7.0, 10.75, 12.0]
+    assert {p.time for p in routes.through([(0, 0), (1, 0)]).points} == {None}
+    assert [p.time for p in routes.through([(1, 1)], 4.0).points] == [4.0]
+    with pytest.raises(KumiteError, match="no check points"):
+        routes.through([], 5.0)
+    with pytest.raises(KumiteError, match="-1"):
+        routes.through([(0, 0)], -1.0)
+
+
+def test_a_check_point_that_is_moved_must_be_reached_anew():
+    route = Route((CheckPoint((0, 0)), CheckPoint((2, 0), require=("fall",)), CheckPoint((4, 0))))
+    progress = Progress(route)
+    progress.update((0, 0), 0.0)
+    progress.update((2, 0), 1.0)
+    assert progress.wanted == ("fall",)
+    progress.move(1, (2, 3))
+    assert progress.wanted == () and progress.goal(1.0) == (2.0, 3.0)
+    assert progress.missed()[0].distance == np.inf
+    progress.move(0, (9, 9))  # is done, and stays so
+    assert progress.index == 1 and route.points[0].place == (0.0, 0.0)
+    with pytest.raises(KumiteError, match="check point 3"):
+        progress.move(3, (0, 0))

@@ -37,6 +37,7 @@ BOREDOM = 1e5  # score that an action loses for each recent use: a blow of 1 m/s
 RESTLESSNESS = 30.0  # score that an action loses for each recent one of its kind
 MEMORY = 8  # actions back that "recently" goes
 GOAL_EVERY = 0.25  # s
+OUTSIDE = 1e12  # score that an action loses which is not in the set: more than all else together
 COOPERATIVE = [HEADING, PLACE, REQUIREMENT]  # columns of weights
 
 
@@ -71,10 +72,15 @@ class Player:
     facing: float | None = None  # rad, in place of the rules' own
     boredom: float = BOREDOM  # score that an action loses for each recent use (B11)
     restlessness: float = RESTLESSNESS  # and for each recent one of its kind
+    only: tuple[str, ...] = ()  # the action set, kinds or labels; empty: all
 
     def __post_init__(self) -> None:
         if not 1 <= self.depth <= DEEPEST:
             raise KumiteError(f"depth {self.depth}; expected 1 to {DEEPEST}")
+        for name in ("boredom", "restlessness"):
+            value = getattr(self, name)
+            if not 0 <= value < np.inf:
+                raise KumiteError(f"{name} {value}; expected 0 or more, finite")
 
 
 @dataclass(frozen=True)
@@ -87,6 +93,7 @@ class Decision:
     nodes: np.ndarray  # [D + 1] at each depth, the root at 0
     considered: np.ndarray  # [D + 1] the same before pruning
     seconds: float
+    outside: bool = False  # of the action set: nothing in it could be done
 
     @property
     def pruned(self) -> float:
@@ -108,7 +115,6 @@ class GameTree:
         """
         self.library = library
         self.rules = rules or Rules()
-        self._asked: dict[tuple, np.ndarray] = {}  # by A⁺ and A⁻: asked for at every decision
         action = library.action_of_stretch
         actions = library.actions
         assert actions is not None  # action_of_stretch has looked
@@ -130,35 +136,52 @@ class GameTree:
 
     @cached_property
     def names(self) -> frozenset[str]:
-        """Kinds and labels that A⁺ and A⁻ may name."""
+        """Kinds and labels that A⁺, A⁻ and the action set may name."""
         return frozenset(self.kinds) | frozenset(self.labels)
+
+    @cached_property
+    def choices(self) -> tuple[str, ...]:
+        """Kinds, then labels, of what can be chosen."""
+        kinds, labels = ({of[k] for k in self._offered} for of in (self.kinds, self.labels))
+        return (*sorted(kinds), *sorted(labels - kinds - {""}))
 
     def asked(self, player: Player) -> np.ndarray:
         """1 of each stretch in A⁺, -1 in A⁻, else 0 [L]. Errors: names that no action has; A⁻
         holds all that can be chosen.
         """
-        found = self._asked.get((player.wanted, player.unwanted))
-        if found is None:
-            found = self._ask(player)
-            self._asked[player.wanted, player.unwanted] = found
-        return found
+        out = self._named(player.wanted).astype(float) - self._named(player.unwanted)
+        if player.unwanted and np.all(out[self._offered] < 0):
+            raise KumiteError("A⁻ holds every action that can be chosen; expected one to be left")
+        return out
 
-    def _ask(self, player: Player) -> np.ndarray:
-        unknown = sorted({*player.wanted, *player.unwanted} - self.names)
+    def allowed(self, player: Player) -> np.ndarray:
+        """Whether each stretch is in the action set [L]. Errors: names that no action has; nothing
+        in it can be chosen.
+        """
+        if not player.only:
+            return np.ones(len(self.kinds), dtype=bool)
+        out = self._named(player.only)
+        if not out[self._offered].any():
+            raise KumiteError(
+                f"the action set ({', '.join(player.only)}) holds no action that can be chosen; "
+                "expected one"
+            )
+        return out
+
+    @cached_property
+    def _offered(self) -> np.ndarray:
+        """Stretches that can be chosen."""
+        return np.unique(self.moves.stretch)
+
+    def _named(self, names: tuple[str, ...]) -> np.ndarray:
+        """Whether each stretch [L] is of one of these kinds or labels. Errors: unknown ones."""
+        unknown = sorted({*names} - self.names)
         if unknown:
             raise KumiteError(
                 f"no action is called {', '.join(map(repr, unknown))}; expected kinds "
                 f"({', '.join(sorted(set(self.kinds)))}) or labels of the library"
             )
-        out = np.zeros(len(self.kinds))
-        for k, names in enumerate(zip(self.kinds, self.labels)):
-            out[k] = any(n in player.wanted for n in names) - any(
-                n in player.unwanted for n in names
-            )
-        offered = np.unique(self.moves.stretch)
-        if player.unwanted and np.all(out[offered] < 0):
-            raise KumiteError("A⁻ holds every action that can be chosen; expected one to be left")
-        return out
+        return np.isin(self.kinds, names) | np.isin(self.labels, names)
 
     def _responses(self) -> np.ndarray:
         """Stretches [2, SIZES] that answer a blow to the trunk and to the head, or NOTHING.
@@ -262,11 +285,13 @@ class GameTree:
         )
 
     def _tired(self, player: Player, recent: tuple[int, ...]) -> np.ndarray:
-        """What recent choices cost each stretch [L]: if it was among them, or many of its kind."""
+        """What each stretch [L] costs the searcher: if it was among its recent choices, or many of
+        its kind; and if it is not in its action set.
+        """
         out, lately, kinds = np.zeros(len(self.kinds)), list(recent), self.kind_number
         np.add.at(out, lately, player.boredom)
         like = np.bincount(kinds[lately], minlength=int(kinds.max()) + 1)
-        return out + player.restlessness * like[kinds]
+        return out + player.restlessness * like[kinds] + OUTSIDE * ~self.allowed(player)
 
     def decide(
         self,
@@ -289,13 +314,15 @@ class GameTree:
         run = SEARCH.serial if bounds or players[0].depth < 3 else SEARCH.parallel
         found = run(game, state, players[0].depth, self.most, bounds)
         best = found.best
+        action, comp = int(found.action[best]), float(found.comp[best])
         return Decision(
-            int(found.action[best]),
-            float(found.comp[best]),
+            action,
+            comp + OUTSIDE * round(-comp / OUTSIDE),  # without what it cost to leave the set
             float(found.coop[best]),
             found.nodes,
             found.considered,
             time.perf_counter() - begin,
+            not self.allowed(players[0])[action],
         )
 
 

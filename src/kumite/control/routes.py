@@ -10,7 +10,7 @@ next one is its goal, p_d of the cooperative function. :class:`Route` says where
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -86,6 +86,20 @@ class Route:
     def then(self, other: Route) -> Route:
         """This route and another one behind it. Errors: times that go back."""
         return Route((*self.points, *other.points))
+
+    def later(self, seconds: float) -> Route:
+        """The same check points, their times so much later."""
+        return Route(
+            tuple(p if p.time is None else replace(p, time=p.time + seconds) for p in self.points)
+        )
+
+    def moved(self, index: int, place: tuple[float, float]) -> Route:
+        """One of its check points in another place (x, z) m. Errors: there is none such."""
+        if not 0 <= index < len(self):
+            raise KumiteError(f"check point {index}; expected 0 to {len(self) - 1}")
+        points = list(self.points)
+        points[index] = replace(points[index], place=place)
+        return Route(tuple(points))
 
 
 @dataclass(frozen=True)
@@ -183,6 +197,17 @@ class Progress:
             self.lacking if current else point.require,
         )
 
+    def move(self, index: int, place: tuple[float, float]) -> None:
+        """Put a check point in another place (x, z) m; if the character waits there, it goes on to
+        the new one. Errors: as :meth:`Route.moved`.
+        """
+        self.route = self.route.moved(index, place)
+        self._places = self.route.places
+        if index >= self.index:
+            self.closest[index] = np.inf
+        if index == self.index:
+            self.arrived, self.lacking = None, self.route.points[index].require
+
     def goal(self, time: float) -> tuple[float, float]:
         """Where (x, z) to go at a time [s], now or later, as far as is known now.
 
@@ -238,7 +263,7 @@ class Progress:
         due = [
             self._miss(k)
             for k in range(self.index, len(self.route))
-            if time == NEVER or (at := self.route.points[k].time) is not None and at <= time
+            if time == NEVER or ((at := self.route.points[k].time) is not None and at <= time)
         ]
         return (*self.given_up, *due)
 
@@ -262,6 +287,29 @@ def line(
     share = _shares(points)[:, None]
     places = (1.0 - share) * np.array(start, dtype=float) + share * np.array(end, dtype=float)
     return _timed(places, seconds, begin, radius)
+
+
+def through(
+    places: Iterable[tuple[float, float]],
+    seconds: float | None = None,
+    *,
+    start: tuple[float, float] | None = None,
+    radius: float = RADIUS,
+) -> Route:
+    """From each place straight to the next, at one speed: at the last one after ``seconds``, on the
+    way from ``start`` or else from the first of them; None: no times. Errors: no places.
+    """
+    route = Route(tuple(CheckPoint(place, radius=radius) for place in places))
+    if seconds is None:
+        return route
+    if not 0 <= seconds < NEVER:
+        raise KumiteError(f"route: {seconds} s; expected 0 s or more, finite")
+    begin = route.places[:1] if start is None else np.array([start])
+    way = np.linalg.norm(np.diff(route.places, axis=0, prepend=begin), axis=1).cumsum()
+    share = way / way[-1] if way[-1] > 0 else np.ones(len(way))
+    return Route(
+        tuple(replace(p, time=float(t)) for p, t in zip(route.points, share * seconds, strict=True))
+    )
 
 
 def circle(

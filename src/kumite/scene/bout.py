@@ -7,17 +7,25 @@ victim's action short; the struck segment gives way, and the reaction that the t
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 
 from kumite.body import ARMS
 from kumite.clip import LIMBS
-from kumite.control import Progress, style
+from kumite.control import Progress, Route, style
 from kumite.control.game_tree import GOAL_EVERY, MEMORY, Decision, GameTree, Player
-from kumite.errors import KumiteError
+from kumite.errors import KumiteError, unknown
 from kumite.graph import Library
 from kumite.kernels.blow import NO_BLOW
 from kumite.kernels.game import FALL, FLINCH, NOTHING, STAGGER
+from kumite.scene.controls import (
+    ORDERS,
+    OrderControl,
+    StyleControl,
+    check_orders,
+    style_controls,
+)
 from kumite.scene.fighters import BoutSettings
 from kumite.scene.floor import Floor, Landing
 from kumite.scene.recording import Event
@@ -28,27 +36,6 @@ from kumite.scene.story import CueSettings, Story
 RECOIL = 0.018  # m that a struck segment gives way per m/s of the blow
 GOALS = 25  # places ahead of which a fighter knows: 6 s
 SIZES = {FLINCH: "flinch", STAGGER: "stagger", FALL: "fall"}
-
-
-class StyleControl:
-    """A number that a fighter goes by: a control of the studio, used by its next decision."""
-
-    def __init__(self, name: str, field: str, player: Player, least: float, most: float) -> None:
-        self.name = name
-        self.field = field
-        self.player = player
-        self.minimum, self.maximum = least, most
-
-    @property
-    def value(self) -> float:
-        holder = self.player if self.field == "depth" else self.player.style
-        return float(getattr(holder, self.field))
-
-    def set(self, value: float) -> None:
-        if self.field == "depth":
-            self.player.depth = round(value)
-        else:
-            self.player.style = self.player.style.changed(**{self.field: float(value)})
 
 
 class BoutScene:
@@ -72,46 +59,55 @@ class BoutScene:
         self.bout = settings.bout or BoutSettings()
         self.tree = GameTree(library, self.bout.rules())
         self.players = [f.player() for f in settings.fighters]
+        self.routes = [f.route() for f in settings.fighters]
         self._kept: dict[int, dict] = {}  # players as they were before a cue changed them
-        self._check_names()
+        for name, player, route in zip(self.names, self.players, self.routes):
+            check_orders(name, self.tree, player, route)
+        for cue in settings.cue:
+            orders = Player(wanted=cue.wanted or (), unwanted=cue.unwanted or ())
+            check_orders(f"cue of {cue.who}", self.tree, orders, cue.route())
         self.reset(seed)
-
-    def _check_names(self) -> None:
-        for player in self.players:
-            self.tree.asked(player)
-        for cue in self.settings.cue:
-            self.tree.asked(Player(wanted=cue.wanted or (), unwanted=cue.unwanted or ()))
-        known = self.tree.names
-        routed = [(f.name, f.point) for f in self.settings.fighters]
-        routed += [(c.who, c.point or ()) for c in self.settings.cue]
-        for name, points in routed:
-            for point in points:
-                unknown = sorted({*point.require, *point.refuse} - known)
-                if unknown:
-                    raise KumiteError(
-                        f"{name}: no action is called {', '.join(map(repr, unknown))} at a "
-                        f"check point; expected one of {', '.join(sorted(known))}"
-                    )
 
     @property
     def controls(self) -> list[StyleControl]:
-        """What the studio may tune while the fight runs."""
-        fields = (
-            ("depth", 1, 5),
-            ("preferred_distance", 0.0, 4.0),
-            ("distance", 0.0, 1e3),
-            ("facing", 0.0, 1e3),
-            ("given_short", 0.0, 1e5),
-            ("given_long", 0.0, 1e5),
-            ("taken", 0.0, 1e5),
-            ("suitability", 0.0, 1e3),
-            ("place", 0.0, 1e3),
-        )
+        """Numbers that may be tuned while the fight runs."""
+        return [c for k in range(len(self.names)) for c in self.controls_of(k)]
+
+    def controls_of(self, k: int) -> list[StyleControl]:
+        """Numbers of one fighter."""
+        return style_controls(self.names[k], self.players[k])
+
+    def orders_of(self, k: int) -> list[OrderControl]:
+        """What one fighter is told of actions: A⁺, A⁻ and the action set."""
         return [
-            StyleControl(f"{who}: {field}", field, player, least, most)
-            for who, player in zip(self.names, self.players)
-            for field, least, most in fields
+            OrderControl(self.names[k], f, self.players[k], self.tree, self.routes[k])
+            for f in ORDERS
         ]
+
+    def set_route(self, name: str, route: Route | None) -> None:
+        """Send a fighter along check points, in place of any it had; its times count from now.
+        None: along none. Errors: nobody is called so; wrong actions at a check point.
+        """
+        k = self._number(name)
+        check_orders(name, self.tree, self.players[k], route)
+        self.routes[k] = route
+        self.progress[k] = None if route is None else Progress(route.later(self.frame / self.fps))
+        self._told[k] = 0
+        self._done[k] = set()
+
+    def move_check_point(self, name: str, index: int, place: tuple[float, float]) -> None:
+        """Put a check point of a fighter's route elsewhere (x, z) m. Errors: there is none such."""
+        k = self._number(name)
+        route, progress = self.routes[k], self.progress[k]
+        if route is None or progress is None:
+            raise KumiteError(f"{name} has no route; expected a check point of one")
+        self.routes[k] = route.moved(index, place)
+        progress.move(index, place)
+
+    def _number(self, name: str) -> int:
+        if name not in self.names:
+            raise unknown("fighter", name, self.names)
+        return self.names.index(name)
 
     def reset(self, seed: int) -> None:
         """Start again from the beginning, with a seed."""
@@ -136,9 +132,7 @@ class BoutScene:
         for k, kept in self._kept.items():
             self.players[k].__dict__.update(kept)
         self._kept = {}
-        self._asked = [(f.wanted, f.unwanted) for f in self.settings.fighters]
-        routes = [f.route() for f in self.settings.fighters]
-        self.progress = [None if r is None else Progress(r) for r in routes]
+        self.progress = [None if r is None else Progress(r) for r in self.routes]
         self._done: list[set[str]] = [set() for _ in range(count)]
         self._told = [0] * count
         self._landed = [NO_BLOW] * count  # the blow each has landed last in what it is doing
@@ -207,9 +201,7 @@ class BoutScene:
             float(self.frame),
             (self._landed[k], self._landed[o]),
         )
-        for p in pair:
-            self._set_goal(p)
-        players = (self.players[k], self.players[o])
+        players = (self._player(k), self._player(o))
         decision = self.tree.decide(state, players, tuple(self._recent[k]))
         self.decisions.append(decision)
         self._recent[k].append(decision.stretch)
@@ -225,15 +217,20 @@ class BoutScene:
             considered=int(decision.considered.sum()),
             pruned=round(decision.pruned, 4),
             jump=bool(cast.jump[k]),
+            **({"outside_set": True} if decision.outside else {}),
         )
 
-    def _set_goal(self, k: int) -> None:
-        player, progress, (wanted, unwanted) = self.players[k], self.progress[k], self._asked[k]
+    def _player(self, k: int) -> Player:
+        """A fighter as it plays now: with where it is to be, and what is wanted there."""
+        player, progress = self.players[k], self.progress[k]
         if progress is None:
-            return
-        player.goal = progress.ahead(self.frame / self.fps, GOAL_EVERY, GOALS)
-        player.wanted = (*wanted, *progress.wanted)
-        player.unwanted = (*unwanted, *progress.unwanted)
+            return player
+        return replace(
+            player,
+            goal=progress.ahead(self.frame / self.fps, GOAL_EVERY, GOALS),
+            wanted=(*player.wanted, *progress.wanted),
+            unwanted=(*player.unwanted, *progress.unwanted),
+        )
 
     def _begin(self, k: int, stretch: int) -> None:
         """Character k begins a stretch now, whatever it does."""
@@ -271,8 +268,7 @@ class BoutScene:
         rules = tree.rules
         size = FALL if speed >= rules.fall_from else int(speed >= rules.stagger_from)
         row = tree.response[int(part in ("head", "neck"))]
-        self._set_goal(landing.victim)
-        if row[FALL] != NOTHING and tree.asked(self.players[landing.victim])[row[FALL]] > 0:
+        if row[FALL] != NOTHING and tree.asked(self._player(landing.victim))[row[FALL]] > 0:
             size = FALL  # it is asked for
         self._react(landing.victim, int(row[size]), size)
 
@@ -295,10 +291,10 @@ class BoutScene:
             player.style = style(cue.style)
         if cue.depth is not None:
             player.depth = cue.depth
-        wanted, unwanted = self._asked[k]
-        wanted = wanted if cue.wanted is None else cue.wanted
-        unwanted = unwanted if cue.unwanted is None else cue.unwanted
-        self._asked[k] = player.wanted, player.unwanted = wanted, unwanted
+        if cue.wanted is not None:
+            player.wanted = cue.wanted
+        if cue.unwanted is not None:
+            player.unwanted = cue.unwanted
         route = cue.route()
         if route is not None:
             self.progress[k], self._told[k] = Progress(route), 0

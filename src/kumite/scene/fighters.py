@@ -80,6 +80,7 @@ class Manner(Settings):
     depth: Depth = 3
     wanted: tuple[str, ...] = ()  # A⁺, kinds or labels of actions
     unwanted: tuple[str, ...] = ()  # A⁻
+    only: tuple[str, ...] = ()  # the action set; empty: all
     facing_deg: Positive | None = None  # from the opponent at the end, in place of the bout's
     boredom: Annotated[Finite, Field(ge=0)] = BOREDOM
     restlessness: Annotated[Finite, Field(ge=0)] = RESTLESSNESS
@@ -106,6 +107,7 @@ class Manner(Settings):
             facing=facing,
             boredom=self.boredom,
             restlessness=self.restlessness,
+            only=self.only,
         )
 
 

@@ -188,8 +188,8 @@ class SceneSettings(Settings):
             route = routed.get(moment.after)
             if route is None or not -len(route) <= moment.check_point < len(route):
                 raise ValueError(
-                    f"after {moment.after!r} at check point {moment.check_point}; expected a fighter "
-                    "with that check point"
+                    f"after {moment.after!r} at check point {moment.check_point}; expected a "
+                    "fighter with that check point"
                 )
         return self
 

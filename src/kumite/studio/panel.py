@@ -9,7 +9,10 @@ import viser
 
 from kumite.errors import KumiteError
 from kumite.scene.actions import ActionPlayback
+from kumite.scene.bout import BoutScene
 from kumite.studio.action_list import ActionList
+from kumite.studio.direction import Direction, Director
+from kumite.studio.paths import Sketch
 from kumite.studio.wording import EventLog, lines_html, score_html
 
 SLOWEST, FASTEST = 0.1, 4.0
@@ -30,7 +33,7 @@ class Control(Protocol):
         ...
 
 
-class Desk(Protocol):
+class Desk(Director, Protocol):
     """What the panel's buttons reach; every call is safe from any thread."""
 
     def toggle(self) -> None:
@@ -84,6 +87,8 @@ class Panel:
         fps: float,
         controls: Sequence[Control],
         actions: ActionPlayback | None = None,
+        fight: BoutScene | None = None,
+        sketch: Sketch | None = None,
     ) -> None:
         self._fps = fps
         self._shown: dict[str, Any] = {}
@@ -118,7 +123,11 @@ class Panel:
         follow = gui.add_checkbox("Follow", True, hint="keep the fighters in the middle")
         follow.on_update(_safely(lambda e: desk.set_follow(e.target.value)))
         self._clock = gui.add_html("")
-        if controls:
+        self._direction: Direction | None = None
+        if fight is not None and sketch is not None:
+            with gui.add_folder("Direction"):
+                self._direction = Direction(server, fight, sketch, desk, _safely)
+        elif controls:
             with gui.add_folder("Parameters"):
                 for control in controls:
                     _add_control(gui, desk, control)
@@ -161,6 +170,8 @@ class Panel:
             '<div style="padding:0 1em .5em;font-size:.85em;opacity:.75">'
             f"{frame / self._fps:.1f} s{note}</div>"
         )
+        if self._direction is not None:
+            self._direction.show()
         for name, handle, content in (
             ("clock", self._clock, clock),
             ("score", self._score, score_html(log)),

@@ -6,6 +6,7 @@ under one lock and leave notes (``_redraw``, ``_rewound``) that the loop acts on
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 import threading
@@ -13,6 +14,7 @@ import time
 import webbrowser
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -20,11 +22,13 @@ from kumite.body import body_mesh
 from kumite.clip import LIMBS, forward_kinematics
 from kumite.errors import KumiteError
 from kumite.scene.actions import ActionPlayback
+from kumite.scene.bout import BoutScene
 from kumite.scene.recording import Event
 from kumite.scene.stage import Playback, Stage
 from kumite.studio import bodies, props, ring
 from kumite.studio.pace import Pace
 from kumite.studio.panel import FASTEST, SLOWEST, Control, Panel
+from kumite.studio.paths import Path, Paths, Sketch, on_floor, sketched
 from kumite.studio.server import close_server, is_loopback, open_server, url_of
 from kumite.studio.wording import EventLog, place, struck
 
@@ -44,6 +48,7 @@ class _Picture:
     objects: np.ndarray  # [O, 3] m
     hits: list[Event] = field(default_factory=list)
     note: str = ""  # behind the time
+    paths: list[Path] = field(default_factory=list)  # of whom is sent along check points
 
 
 class Studio:
@@ -86,6 +91,9 @@ class Studio:
         self._bodies = bodies.show_bodies(server, stage.skeleton, mesh, stage.names)
         self._targets = props.Targets(server, stage.objects, self.move_object)
         self._bursts = props.Bursts(server)
+        self._fight = stage if isinstance(stage, BoutScene) else None
+        self._sketch = Sketch()
+        self._paths = Paths(server, self._move_check_point)
         self._panel = Panel(
             server,
             self,
@@ -95,6 +103,8 @@ class Studio:
             fps=stage.fps,
             controls=[c for c in getattr(stage, "controls", ()) if isinstance(c, Control)],
             actions=stage if isinstance(stage, ActionPlayback) else None,
+            fight=self._fight,
+            sketch=self._sketch,
         )
         picture = self._look()
         self._follow.jump(_midpoint(picture))
@@ -188,6 +198,20 @@ class Studio:
         with self._lock:
             control.set(value)
 
+    def direct(self, act: Callable[[], Any]) -> Any:
+        """Do something to the stage between two frames, and show it."""
+        with self._lock:
+            found = act()
+        self._poke()
+        return found
+
+    def _move_check_point(self, who: int, index: int, eye: np.ndarray, way: np.ndarray) -> None:
+        """Put a check point where a ray of the page meets the floor."""
+        place, fight = on_floor(self.from_page(eye), way), self._fight
+        if place is not None and fight is not None and self._sketch.who != who:
+            with contextlib.suppress(KumiteError):  # its path may have been cleared meanwhile
+                self.direct(lambda: fight.move_check_point(fight.names[who], index, place))
+
     def move_object(self, name: str, position: np.ndarray) -> None:
         """Put an object at ``position`` [3] m."""
         with self._lock:
@@ -210,6 +234,11 @@ class Studio:
         """Where a point [3] m of the stage lies in the page's world, which follows the fighters."""
         x, z = self._follow.centre
         return np.asarray(point, dtype=np.float64) - np.array([x, 0.0, z])
+
+    def from_page(self, point: np.ndarray) -> np.ndarray:
+        """Where a point [3] m of the page's world lies on the stage."""
+        x, z = self._follow.centre
+        return np.asarray(point, dtype=np.float64) + np.array([x, 0.0, z])
 
     def run(self, seconds: float | None = None) -> None:
         """Play until :meth:`stop`, or for ``seconds`` of wall time."""
@@ -273,7 +302,18 @@ class Studio:
             np.array([o.position for o in stage.objects], dtype=np.float64).reshape(-1, 3),
             hits,
             f" · frame {stage.clip_frame} of its clip" if isinstance(stage, ActionPlayback) else "",
+            self._routes(),
         )
+
+    def _routes(self) -> list[Path]:
+        """Every fighter's check points; a path in the making stands for its fighter's."""
+        if self._fight is None:
+            return []
+        return [
+            Path(k, p.route, p.index)
+            for k, p in enumerate(self._fight.progress)
+            if p is not None and k != self._sketch.who
+        ] + sketched(self._sketch)
 
     def _draw(self, picture: _Picture, seconds: float) -> None:
         position, world = forward_kinematics(
@@ -281,10 +321,11 @@ class Studio:
         )
         for hit in picture.hits:
             self._show_hit(hit, position)
-        if not self._targets.held:
+        if not (self._targets.held or self._paths.held or self._sketch.who is not None):
             self._follow.update(_midpoint(picture), seconds)
         self._bodies.draw(position, world, seconds)
         self._targets.draw(picture.objects, seconds)
+        self._paths.draw(picture.paths)
         self._animating = self._bursts.draw(seconds)
         now = time.perf_counter()
         if now - self._panel_at >= PANEL_PERIOD or seconds == 0.0 or not self._playing:

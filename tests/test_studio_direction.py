@@ -1,0 +1,231 @@
+"""Fighters directed from the page: what is pressed and drawn there is what they go by."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import viser
+
+from kumite.control import CheckPoint, Route
+from kumite.graph import Library
+from kumite.scene import BoutScene, SceneSettings, load_scene
+from kumite.studio import Studio
+from kumite.studio.paths import Path, Sketch, on_floor, sketched
+from tests import browser
+from tests.test_studio import running, wait
+from tests.test_studio_actions import _pick, _text
+
+
+def fight(fighters: Library, pairs: int = 1) -> BoutScene:
+    """Boxing at depth 1, of so many pairs side by side."""
+    settings = load_scene("boxing").model_dump(exclude_none=True)
+    out = []
+    for pair in range(pairs):
+        for fighter in settings["fighter"]:
+            name, against = (f"{fighter[key]}{pair or ''}" for key in ("name", "against"))
+            x, z = fighter["position"]
+            more = {"name": name, "against": against, "position": (x + 3.0 * pair, z), "depth": 1}
+            out.append(fighter | more)
+    return BoutScene(SceneSettings.model_validate(settings | {"fighter": out}), fighters, seed=1)
+
+
+def test_where_a_ray_meets_the_floor():
+    assert on_floor(np.array([1.0, 2.0, 3.0]), np.array([0.5, -1.0, 0.0])) == (2.0, 3.0)
+    assert on_floor(np.array([1.0, 2.0, 3.0]), np.array([0.5, 0.1, 0.0])) is None
+
+
+def test_a_sketch_is_seen_before_it_is_a_route():
+    sketch = Sketch()
+    assert sketched(sketch) == []
+    sketch.begin(1)
+    sketch.places += [(0.0, 0.0), (3.0, 0.0)]
+    (path,) = sketched(sketch)
+    assert path.who == 1 and path.route.places.tolist() == [[0.0, 0.0], [3.0, 0.0]]
+    sketch.end()
+    assert sketched(sketch) == []
+
+
+def test_one_fighters_controls_are_shown_however_many_there_are(fighters: Library):
+    for pairs in (1, 4):
+        stage = fight(fighters, pairs)
+        studio = Studio(stage, port=0)
+        try:
+            direction = studio._panel._direction
+            assert direction is not None
+            assert len(direction._sliders) == len(stage.controls_of(0)) == 15
+        finally:
+            studio.close()
+
+
+def test_routes_of_the_scene_are_on_the_floor_and_follow_what_is_told(fighters: Library):
+    stage = fight(fighters)
+    stage.set_route("blue", Route((CheckPoint((0, 3)), CheckPoint((2, 3)))))
+    studio = Studio(stage, port=0)
+    try:
+        shown, handles = studio._paths._shown, studio._paths._handles
+        progress = stage.progress[1]
+        assert progress is not None
+        assert shown == {1: Path(1, progress.route, 0)} and len(handles[1]) == 2
+        studio.direct(lambda: stage.set_route("red", Route((CheckPoint((0, 0)),))))
+        studio.direct(lambda: stage.move_check_point("blue", 1, (4.0, 4.0)))
+        studio._draw(studio._look(), 0.0)
+        assert sorted(shown) == [0, 1] and len(handles[0]) == 1
+        discs = handles[1][0]
+        assert isinstance(discs, viser.BatchedMeshHandle)
+        assert np.allclose(discs.batched_positions[1, [0, 2]], (4.0, 4.0))
+        studio.direct(lambda: stage.set_route("blue", None))
+        studio._draw(studio._look(), 0.0)
+        assert sorted(shown) == sorted(handles) == [0]
+    finally:
+        studio.close()
+
+
+@pytest.mark.slow
+def test_a_path_is_drawn_dragged_and_cleared_with_the_mouse(fighters: Library):
+    browser.need_chromium()
+    stage = fight(fighters)
+    studio = Studio(stage, port=0)
+    studio.toggle()
+    with running(studio), browser.open_page(studio.url) as (page, traffic):
+        client = browser.client_of(studio.server, page)
+        page.wait_for_selector("canvas")
+        page.wait_for_timeout(2500)
+        browser.close_notes(page)
+        middle = stage.root_position.mean(axis=0) * [1, 0, 1]
+        away = middle - (studio.from_page(client.camera.position) * [1, 0, 1])
+        away /= np.linalg.norm(away)
+        aside = np.array([away[2], 0.0, -away[0]])
+        places = [middle - 0.5 * away + s * aside for s in (-0.8, 0.0, 0.8)]  # before their feet
+
+        def route() -> Route:
+            assert stage.routes[0] is not None
+            return stage.routes[0]
+
+        def pixel(place: np.ndarray) -> tuple[float, float]:
+            return browser.project(studio.seen_at(place), client.camera, page)
+
+        def redness(place: np.ndarray) -> float:
+            patch = browser.around(browser.picture(page), pixel(place), 2).astype(float)
+            return float((patch[..., 0] - patch[..., 2]).mean())
+
+        page.get_by_role("button", name="Finish").click()
+        browser.wait_until(page, lambda: "no path is being drawn" in _text(page), "a refusal")
+        browser.close_notes(page)
+        page.get_by_label("Seconds", exact=True).fill("6")
+        page.get_by_role("button", name="Draw path").click()
+        browser.wait_until(page, lambda: "click on the floor" in _text(page), "drawing")
+        plain = [redness(p) for p in places]
+        for k, place in enumerate(places):
+            page.mouse.click(*pixel(place))
+            assert wait(lambda k=k: len(studio._sketch.places) == k + 1)
+        assert stage.routes[0] is None  # not yet: it is being drawn
+        page.get_by_role("button", name="Finish").click()
+        assert wait(lambda: stage.routes[0] is not None)
+        assert np.allclose(route().places, np.array(places)[:, [0, 2]], atol=0.03)
+        times = [p.time or 0.0 for p in route().points]
+        assert times == sorted(times) and times[-1] == pytest.approx(6.0)
+        browser.wait_until(page, lambda: "3 check points, next 1" in _text(page), "the path")
+        browser.wait_until(page, lambda: "place was 0" in _text(page), "a word on its weight")
+        assert stage.players[0].style.place == 10.0
+        browser.close_notes(page)
+        browser.wait_until(
+            page,
+            lambda: all(redness(p) > before + 40 for p, before in zip(places, plain)),
+            "red discs",
+        )
+
+        goal = places[1] + 0.3 * aside + 0.1 * away
+        browser.drag(page, pixel(places[1]), pixel(goal))
+        assert wait(lambda: np.allclose(route().places[1], goal[[0, 2]], atol=0.1))
+        progress = stage.progress[0]
+        assert progress is not None and np.allclose(progress.route.places, route().places)
+        assert wait(lambda: not studio._paths.held)
+        assert [p.time for p in route().points] == times
+
+        studio.set_speed(4.0)
+        studio.toggle()
+        browser.wait_until(
+            page,
+            lambda: any(e.kind == "check point" and e.character == "red" for e in stage.events),
+            "a check point",
+            60,
+        )
+        page.get_by_role("button", name="Clear").click()
+        assert wait(lambda: stage.routes[0] is None and stage.progress[0] is None)
+        browser.wait_until(page, lambda: "no path" in _text(page), "no path")
+        assert traffic.errors == []
+
+
+@pytest.mark.slow
+def test_weights_and_actions_are_told_on_the_page(fighters: Library):
+    browser.need_chromium()
+    stage = fight(fighters)
+    red, blue = stage.players
+    studio = Studio(stage, port=0)
+    studio.toggle()
+    with running(studio), browser.open_page(studio.url) as (page, traffic):
+        browser.client_of(studio.server, page)
+        page.wait_for_selector("canvas")
+        page.wait_for_timeout(2000)
+        browser.close_notes(page)
+        for folder in ("Weights", "Actions"):
+            page.get_by_text(folder, exact=True).click()
+        fields = [c.field for c in stage.controls_of(0)]
+
+        def slider(field: str):
+            return page.get_by_role("slider").nth(1 + fields.index(field))  # the first is Speed
+
+        def nudge(field: str, key: str = "ArrowRight") -> None:
+            slider(field).focus()
+            page.keyboard.press(key)
+
+        nudge("depth")
+        assert wait(lambda: red.depth == 2) and blue.depth == 1
+        nudge("taken", "ArrowLeft")
+        assert wait(lambda: red.style.taken == 99000.0)
+        nudge("restlessness")
+        assert wait(lambda: red.restlessness == 40.0)
+        nudge("preferred_heading")
+        assert wait(lambda: red.style.preferred_heading == pytest.approx(np.radians(5.0)))
+        assert red.style.heading == 10.0
+        browser.wait_until(
+            page, lambda: slider("heading").get_attribute("aria-valuenow") == "10", "its weight"
+        )
+
+        for name in ("attack", "defence", "idle"):
+            _pick(page, "A⁻ unwanted", name)
+            assert wait(lambda name=name: name in red.unwanted)
+        assert red.style.requirement == 1e6
+        _pick(page, "A⁻ unwanted", "transition")
+        browser.wait_until(page, lambda: "A⁻ holds every action" in _text(page), "a refusal")
+        assert red.unwanted == ("attack", "defence", "idle")
+        _pick(page, "A⁻ unwanted", "✓ defence")
+        assert wait(lambda: red.unwanted == ("attack", "idle"))
+        _pick(page, "A⁺ wanted", "transition")
+        assert wait(lambda: red.wanted == ("transition",))
+        _pick(page, "May do", "transition")
+        assert wait(lambda: red.only == ("transition",))
+
+        _pick(page, "Fighter", "blue")
+        browser.wait_until(
+            page, lambda: slider("depth").get_attribute("aria-valuenow") == "1", "blue's depth"
+        )
+        assert page.get_by_label("May do", exact=True).first.input_value() == "—"
+        nudge("depth")
+        assert wait(lambda: blue.depth == 2) and red.depth == 2
+
+        count = len(stage.events)
+        studio.set_speed(4.0)
+        studio.toggle()
+
+        def decided() -> list:
+            return [e for e in stage.events[count:] if e.kind == "decision"]
+
+        browser.wait_until(
+            page, lambda: sum(e.character == "red" for e in decided()) >= 5, "decisions", 60
+        )
+        for e in decided():
+            if e.character == "red":
+                inside = stage.tree.kinds[e.data["stretch"]] == "transition"
+                assert inside != e.data.get("outside_set", False)
+        assert traffic.errors == []
