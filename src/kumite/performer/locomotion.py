@@ -193,8 +193,16 @@ _LEAP = {
     "heel": ((0.22, (26, 26)), (0.36, (32, 32)), (0.56, (6, 6))),
 }  # fmt: skip
 
-_LEFTWARD = (Step("left", 0.06, 0.38, 0.06), Step("right", 0.42, 0.78, 0.06))
-_RIGHTWARD = (Step("right", 0.06, 0.38, 0.06), Step("left", 0.42, 0.78, 0.06))
+# The foot of that side makes room for the other one before it comes to stand.
+_LEFTWARD = (
+    Step("left", 0.06, 0.36, 0.06, to=(0.17, 0.11, 14.0)),
+    Step("right", 0.40, 0.72, 0.06),
+    Step("left", 0.76, 1.02, 0.05),
+)
+_RIGHTWARD = tuple(
+    Step("right" if s.foot == "left" else "left", s.lift, s.land, s.height, to=to)
+    for s, to in zip(_LEFTWARD, ((-0.17, 0.11, -14.0), None, None))
+)
 
 MOVES: tuple[Move, ...] = (
     Move(
@@ -202,8 +210,8 @@ MOVES: tuple[Move, ...] = (
         {"pelvis": ((0.7, (0.02, -0.004, 0.0)), (1.6, (-0.015, -0.004, 0.0))),
          "chest_turn": ((0.8, (2, 0, 0)), (1.6, (-2, 0, 0))), "head_turn": ((0.7, (8, 1, 0)), (1.5, (-7, -1, 0)))},
     ),
-    Move("turn_left", "transition", 0.95, {"head_turn": ((0.2, (18, 0, 0)),)}, _LEFTWARD, (0, 0, 50)),
-    Move("turn_right", "transition", 0.95, {"head_turn": ((0.2, (-18, 0, 0)),)}, _RIGHTWARD, (0, 0, -50)),
+    Move("turn_left", "transition", 1.12, {"head_turn": ((0.2, (18, 0, 0)),)}, _LEFTWARD, (0, 0, 45)),
+    Move("turn_right", "transition", 1.12, {"head_turn": ((0.2, (-18, 0, 0)),)}, _RIGHTWARD, (0, 0, -45)),
     *_GAITS,
     *(_from_stand(g, f"{g.label}_start") for g in _GAITS if "turn" not in g.label),
     *(_to_stand(g, f"{g.label}_stop") for g in _GAITS if "turn" not in g.label),
