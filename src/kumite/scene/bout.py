@@ -17,15 +17,13 @@ from kumite.control.game_tree import MEMORY, Decision, GameTree, Player
 from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.kernels.blow import NO_BLOW
-from kumite.kernels.game import FALL, FLINCH, NOTHING, STAGGER
 from kumite.scene.fighters import BoutSettings
 from kumite.scene.floor import Floor, Landing
+from kumite.scene.reactions import Reactions
 from kumite.scene.recording import Event
 from kumite.scene.settings import SceneSettings
 from kumite.scene.stage import SceneObject
 
-RECOIL = 0.018  # m that a struck segment gives way per m/s of the blow
-SIZES = {FLINCH: "flinch", STAGGER: "stagger", FALL: "fall"}
 
 
 class StyleControl:
@@ -67,7 +65,9 @@ class BoutScene:
         self.fps = library.clips.fps
         self.skeleton = library.clips.skeleton
         self.names = settings.names
-        self.tree = GameTree(library, (settings.bout or BoutSettings()).rules())
+        bout = settings.bout or BoutSettings()
+        self.tree = GameTree(library, bout.rules())
+        self.reactions = Reactions(self.tree, len(self.names), bout.reactions)
         self.players = [f.player() for f in settings.fighter]
         for player, fighter in zip(self.players, settings.fighter):
             self.tree.asked(player)
@@ -129,6 +129,7 @@ class BoutScene:
             facing = np.array([*f.position, np.radians(f.yaw_deg)])
             cast.place(k, int(table.target[self.stretch[k]]), facing)
         self.floor.start()
+        self.reactions.start(self.floor)
 
     @property
     def root_position(self) -> np.ndarray:
@@ -145,7 +146,7 @@ class BoutScene:
         """One frame: who has ended an action looks ahead and chooses, all move on."""
         for k in self.cast.waiting.tolist():
             self._choose(k)
-        happened = self.floor.advance()
+        happened = self.reactions.advance()
         self.frame += 1
         self._pass_check_points()
         if happened:
@@ -161,7 +162,8 @@ class BoutScene:
         cast, table, o = self.cast, self.library.table, int(self.floor.opponent[k])
         facing = cast.facing
         pair = (k, o)
-        local = [int(cast.frame[p] - table.first[self.stretch[p]] + 1) for p in pair]
+        late = self.reactions.late
+        local = [int(cast.frame[p] - table.first[self.stretch[p]] + 1 - late[p]) for p in pair]
         begun = (float(self.frame - local[0]), float(self.frame - local[1]))
         state = self.tree.state(
             (int(self.stretch[k]), int(self.stretch[o])),
@@ -206,6 +208,10 @@ class BoutScene:
         """Character k begins a stretch now, whatever it does."""
         chosen = np.full(len(self.names), stretch)
         self.cast.begin(np.array([k]), chosen)
+        self._does(k, stretch)
+
+    def _does(self, k: int, stretch: int) -> None:
+        """Character k is in a stretch from now on."""
         self.stretch[k] = stretch
         self._landed[k] = NO_BLOW
         self._done[k] |= {self.tree.kinds[stretch], self.tree.labels[stretch]}
@@ -213,9 +219,8 @@ class BoutScene:
     # Bodies --------------------------------------------------------------------------------------
 
     def _land(self, landing: Landing) -> None:
-        """A blow has landed: say so, let the struck segment give, and react to it."""
-        body, tree = self.floor.body, self.tree
-        part = body.parts[landing.part]
+        """A blow has landed: say so, and react to it."""
+        part = self.floor.body.parts[landing.part]
         speed = float(np.linalg.norm(landing.velocity))
         blocked = part in ARMS
         self._landed[landing.who] = landing.blow
@@ -231,17 +236,13 @@ class BoutScene:
             blocked=blocked,
             blow=landing.blow,
         )
-        joint = int(body.joint[landing.part])
-        self.cast.strike(landing.victim, joint, landing.place, RECOIL * landing.velocity)
-        if blocked:
+        reaction = self.reactions.react(landing, blocked)
+        if reaction is None:
             return
-        rules = tree.rules
-        size = FALL if speed >= rules.fall_from else int(speed >= rules.stagger_from)
-        response = int(tree.response[int(part in ("head", "neck")), size])
-        if response == NOTHING:
-            return
-        self._begin(landing.victim, response)
-        self._event("reaction", landing.victim, action=tree.labels[response], size=SIZES[size])
+        if not reaction.begun:
+            self._begin(landing.victim, reaction.stretch)
+        self._does(landing.victim, reaction.stretch)
+        self._event("reaction", landing.victim, **reaction.told)
 
     # Check points --------------------------------------------------------------------------------
 

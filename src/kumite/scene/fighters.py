@@ -130,7 +130,8 @@ class BoutSettings(_Settings):
     catch: Annotated[Finite, Field(ge=0)] = 0.0  # m; 0: nobody is caught
     stagger_from: Positive = 5.2  # m/s of a blow
     fall_from: Positive = 10.0  # m/s
+    reactions: Literal["physical", "kinematic", "auto"] = "auto"  # what moves a struck body
 
     def rules(self) -> Rules:
-        values = self.model_dump(exclude={"library", "facing_deg"})
+        values = self.model_dump(exclude={"library", "facing_deg", "reactions"})
         return Rules(facing=self.facing_deg * 3.141592653589793 / 180.0, **values)
