@@ -1,7 +1,7 @@
 """A fight by game tree: each fighter looks ahead whenever its action has ended (Shum et al. 2012).
 
 Everything that is decided on may change between two decisions (B12). A blow that lands cuts its
-victim's action short; the struck segment gives way, and the reaction that the tree expects follows.
+victim's action short; what follows is said by :mod:`kumite.scene.reactions`.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from kumite.control.game_tree import MEMORY, Decision, GameTree, Player
 from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.kernels.blow import NO_BLOW
+from kumite.scene.apart import push_apart
 from kumite.scene.fighters import BoutSettings
 from kumite.scene.floor import Floor, Landing
 from kumite.scene.reactions import Reactions
 from kumite.scene.recording import Event
 from kumite.scene.settings import SceneSettings
 from kumite.scene.stage import SceneObject
-
 
 
 class StyleControl:
@@ -147,6 +147,7 @@ class BoutScene:
         for k in self.cast.waiting.tolist():
             self._choose(k)
         happened = self.reactions.advance()
+        push_apart(self.floor)
         self.frame += 1
         self._pass_check_points()
         if happened:
@@ -239,9 +240,8 @@ class BoutScene:
         reaction = self.reactions.react(landing, blocked)
         if reaction is None:
             return
-        if not reaction.begun:
-            self._begin(landing.victim, reaction.stretch)
-        self._does(landing.victim, reaction.stretch)
+        begin = self._does if reaction.begun else self._begin
+        begin(landing.victim, reaction.stretch)
         self._event("reaction", landing.victim, **reaction.told)
 
     # Check points --------------------------------------------------------------------------------

@@ -36,6 +36,7 @@ from kumite.synthesis.response import SIZES
 
 SECONDS = 0.2  # of physics after a blow
 MOST_PHYSICAL = 8  # fighters up to which "auto" is physical: a push takes 30 to 40 ms
+HURRY = 3.0  # cost of a second more of a response: nobody shall stand there and be struck for long
 RECOIL = 0.018  # m that a struck segment gives way per m/s of the blow, without physics
 
 
@@ -163,6 +164,7 @@ class Reactions:
             pushed.impulse,
             stagger_from=mass * rules.stagger_from,
             fall_from=mass * rules.fall_from,
+            hurry=HURRY / self.floor.fps,
         )
         frame, last = int(self._responses.frame[entry]), int(self._responses.last[entry])
         stretch = int(self._stretch[self._responses.response[entry]])
@@ -180,6 +182,7 @@ class Reactions:
             last,
         )
         cast.frame[k] = self._counted(k, moment)
+        cast.held[k], cast.stands[k] = True, planted
         size = SIZES[self._responses.size[entry]]
         return Reaction(stretch, True, self._told(stretch, size, pushed.impulse, pushed))
 
@@ -235,8 +238,6 @@ class Reactions:
     def _enter(self, k: int, moment: _Physical) -> None:
         """The last pose is shown: from here on the response is played."""
         end, carried = moment.pushed.end, self._carried(k, moment)
-        now = Moment(
-            end.root_position + carried, end.wxyz, end.root_velocity, end.joint_velocity
-        )
+        now = Moment(end.root_position + carried, end.wxyz, end.root_velocity, end.joint_velocity)
         ankles = self._ankles(moment.shown - 1, moment, carried)
         self.floor.cast.adopt(k, moment.entry, moment.last, now, ankles)

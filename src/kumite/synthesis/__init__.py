@@ -2,7 +2,14 @@
 
 from kumite.synthesis.cast import Cast
 from kumite.synthesis.moment import Moment
-from kumite.synthesis.ragdoll import EFFECTIVE_MASS, Pushed, Ragdoll, Tone, blow_impulse, has_physics
+from kumite.synthesis.ragdoll import (
+    EFFECTIVE_MASS,
+    Pushed,
+    Ragdoll,
+    Tone,
+    blow_impulse,
+    has_physics,
+)
 from kumite.synthesis.response import Responses, find_responses
 
 __all__ = [

@@ -63,7 +63,7 @@ class Cast:
         )
         self.jump = np.zeros(count, dtype=bool)  # whether the last action began with a join
         self.held = np.zeros(count, dtype=bool)  # shows poses handed to it, until it adopts one
-        self._stands = np.zeros((count, 2), dtype=bool)  # on which feet it does
+        self.stands = np.zeros((count, 2), dtype=bool)  # on which feet it does so
         self.played = kernels.Played(
             self.frame,
             self.stop,
@@ -84,7 +84,7 @@ class Cast:
     def contacts(self) -> np.ndarray:
         """Which feet are planted now [K, 2] bool."""
         on_ground = self.library.contacts.on_ground[self.frame]
-        return np.where(self.held[:, None], self._stands, on_ground)
+        return np.where(self.held[:, None], self.stands, on_ground)
 
     @property
     def facing(self) -> np.ndarray:
@@ -116,7 +116,7 @@ class Cast:
         alone: a cast of one from the same library, to try it on.
         """
         alone.frame[0], alone.stop[0] = self.frame[k], self.stop[k]
-        alone.anchor[0], alone.held[0] = self.anchor[k], self.held[k]
+        alone.anchor[0] = self.anchor[k]
         for mine, theirs in zip(alone._offsets, self._offsets):
             mine[0] = theirs[k]
         roots, turns = [], []
@@ -147,7 +147,7 @@ class Cast:
         self.frame[k] = frame
         self._take(k, root_position, wxyz, still, ankles, still[:2])
         self.frame[k] -= 1  # the frame that comes moves it on
-        self.held[k], self._stands[k] = True, stands
+        self.held[k], self.stands[k] = True, stands
 
     def adopt(
         self, k: int, frame: int, last: int, now: Moment, ankles: np.ndarray | None = None
@@ -211,6 +211,11 @@ class Cast:
     def foot_offset(self) -> np.ndarray:
         """How far [K, 2, 3] planted feet are held from where the capture has them [m]."""
         return self._offsets.foot
+
+    def carry(self, k: int, way: np.ndarray) -> None:
+        """Carry a character away over the ground by way [2] m; planted feet stay where they are."""
+        self.anchor[k, :2] += way
+        self._offsets.foot[k][:, [0, 2]] -= way
 
     def strike(self, k: int, joint: int, point: np.ndarray, displacement: np.ndarray) -> None:
         """Displace a struck segment: ``point`` moves by about ``displacement`` [3] and recovers.
