@@ -147,7 +147,7 @@ def find_actions(
     ways = strike_directions(clips, strikes)
     striking = np.array([way != "" for way in ways], dtype=bool)
     parts = classified(frames[:-1], frames[1:], reasons[:-1])
-    keep = _wanted(parts, round(settings.cuts.shaken * clips.fps))
+    keep = _wanted(parts)
     if not all(keep):
         start = np.array([p.start for p, kept in zip(parts, keep) if kept])
         cut = np.array([p.cut for p, kept in zip(parts, keep) if kept])
@@ -163,25 +163,21 @@ def find_actions(
     )
 
 
-def _wanted(parts: list[_Part], shaken: int) -> list[bool]:
-    """Which parts begin an action: the others go on with the one before.
-
-    shaken [frames]: a reaction shorter than that goes on over the step that ends it.
-    """
+def _wanted(parts: list[_Part]) -> list[bool]:
+    """Which parts begin an action: the others go on with the one before."""
     out = []
     for k, part in enumerate(parts):
         if k == 0 or part.cut == Cut.BORDER:
             out.append(True)
             continue
         before, both_idle = parts[k - 1], parts[k - 1].kind == part.kind == "idle"
-        struck = before.kind == "reaction" and before.stop - before.start < shaken
         joins = (
             # standing on after steps on the spot, and before the first of them
             (part.cut == Cut.REST_BEGINS and both_idle)
             or (part.cut == Cut.REST_ENDS and both_idle and before.cut == Cut.BORDER)
             or (part.cut == Cut.SHORT_REST and both_idle)
-            # a blow that is not got over yet, and bounces
-            or (part.cut == Cut.STEP and (struck or both_idle))
+            # one blow that takes more than two steps to get over, and bounces
+            or (part.cut == Cut.STEP and (before.kind == "reaction" or both_idle))
         )
         out.append(not joins)
     return out

@@ -62,7 +62,6 @@ class CutSettings:
     short_rest: float = 0.3  # a shorter one does not part two steps on the spot
     stand: float = 0.2  # shorter double support is part of a step
     shortest: float = 0.15  # of a part
-    shaken: float = 0.8  # a blow takes so long to get over: steps part it from what follows then
 
 
 class Cut(IntEnum):
