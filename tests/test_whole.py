@@ -164,17 +164,19 @@ def nodes_of(library: Library) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_a_reaction_ends_where_both_feet_stand_again():
-    _, actions = toy([("aba", "reaction"), ("ab", "attack")])
+    _, parts = toy([("aba", "reaction"), ("ab", "attack")])
+    one = [0, 2]  # the first two parts are one reaction
+    what = (x[one] for x in (parts.kind, parts.limb, parts.direction))
+    actions = Actions(parts.start[one], parts.stop[1:], *what, ("hit", "blow"), parts.clip_start)
     fps = 20.0
-    after = int(actions.start[0] + SHAKEN * fps)
-    long = replace(actions, stop=np.array([actions.stop[1], *actions.stop[1:]])[[0, 2]],
-                   **{n: getattr(actions, n)[[0, 2]] for n in ("start", "kind", "limb", "direction")},
-                   label=("a", "b"))  # fmt: skip
+    after = round(SHAKEN * fps)
     on_ground = np.ones((int(actions.stop[-1]), 2), dtype=bool)
-    assert np.array_equal(_recovered(long, on_ground, fps).stop, long.stop)  # no foot comes down
+    assert np.array_equal(
+        _recovered(actions, on_ground, fps).stop, actions.stop
+    )  # no foot comes down
     for foot, (up, down) in enumerate([(2, 5), (after + 2, after + 4)]):  # the first: too soon
         on_ground[up:down, foot] = False
-    assert _recovered(long, on_ground, fps).stop.tolist() == [after + 5, long.stop[1]]
+    assert _recovered(actions, on_ground, fps).stop.tolist() == [after + 5, actions.stop[1]]
 
 
 def check_graph(library: Library) -> None:
