@@ -166,8 +166,9 @@ def nodes_of(library: Library) -> tuple[np.ndarray, np.ndarray]:
 def test_a_reaction_ends_where_both_feet_stand_again():
     _, parts = toy([("aba", "reaction"), ("ab", "attack")])
     one = [0, 2]  # the first two parts are one reaction
-    what = (x[one] for x in (parts.kind, parts.limb, parts.direction))
-    actions = Actions(parts.start[one], parts.stop[1:], *what, ("hit", "blow"), parts.clip_start)
+    kind, limb, way = parts.kind[one], parts.limb[one], parts.direction[one]
+    names, clip_start = ("hit", "blow"), parts.clip_start
+    actions = Actions(parts.start[one], parts.stop[1:], kind, limb, way, names, clip_start)
     fps = 20.0
     after = round(SHAKEN * fps)
     on_ground = np.ones((int(actions.stop[-1]), 2), dtype=bool)

@@ -125,7 +125,7 @@ def _recovered(actions: Actions, on_ground: np.ndarray, fps: float) -> Actions:
     """Actions in which a reaction to a hit ends where, :data:`SHAKEN` after it began, both feet
     come to stand (on_ground [F, 2]); what he does from there until he rests is left out.
     """
-    both = on_ground.all(axis=1)
+    both = on_ground[:, 0] & on_ground[:, 1]
     stands = np.flatnonzero(both[1:] & ~both[:-1]) + 1
     begins = actions.start + round(SHAKEN * fps)
     next_stand = np.append(stands, len(both))[np.searchsorted(stands, begins)]
