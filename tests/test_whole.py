@@ -14,7 +14,7 @@ from kumite.annotate import DIRECTIONS, KINDS, NO_LIMB, Actions
 from kumite.clip import Clip, ClipSet, concatenate
 from kumite.errors import KumiteError
 from kumite.graph import Library, build_action_library, load_library, pose_features, save_library
-from kumite.graph.whole import MOST_WAYS
+from kumite.graph.whole import MOST_WAYS, SHAKEN, _recovered
 from kumite.rotation import from_axis_angle, planar_compose
 from kumite.scene import CharacterMetrics, Recording, measure
 from kumite.scene.metrics import source_skate
@@ -163,6 +163,23 @@ def nodes_of(library: Library) -> tuple[np.ndarray, np.ndarray]:
     return np.array([sets.index(o) for o in offered]), start
 
 
+def test_a_reaction_ends_where_both_feet_stand_again():
+    _, parts = toy([("aba", "reaction"), ("ab", "attack")])
+    one = [0, 2]  # the first two parts are one reaction
+    kind, limb, way = parts.kind[one], parts.limb[one], parts.direction[one]
+    names, clip_start = ("hit", "blow"), parts.clip_start
+    actions = Actions(parts.start[one], parts.stop[1:], kind, limb, way, names, clip_start)
+    fps = 20.0
+    after = round(SHAKEN * fps)
+    on_ground = np.ones((int(actions.stop[-1]), 2), dtype=bool)
+    assert np.array_equal(
+        _recovered(actions, on_ground, fps).stop, actions.stop
+    )  # no foot comes down
+    for foot, (up, down) in enumerate([(2, 5), (after + 2, after + 4)]):  # the first: too soon
+        on_ground[up:down, foot] = False
+    assert _recovered(actions, on_ground, fps).stop.tolist() == [after + 5, actions.stop[1]]
+
+
 def check_graph(library: Library) -> None:
     """What must hold of any action-level graph."""
     table, clips, actions = library.table, library.clips, library.actions
@@ -293,7 +310,7 @@ def test_the_real_boxers_graph(boxer: Library):
     library = build_action_library(boxer.clips)
     check_graph(library)
     r = library.report
-    assert r["stretches"] >= 0.9 * r["actions_found"]
+    assert r["stretches"] >= 0.88 * r["actions_found"]
     assert r["mean_ways_out"] > 40
     for walk in (random_walk(library, 60.0, seed) for seed in range(3)):
         assert walk.joins > 30  # else there is nothing to be judged

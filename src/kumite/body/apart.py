@@ -41,21 +41,30 @@ def keep_out(
     other: Body,
     other_position: np.ndarray,
     other_world_wxyz: np.ndarray,
+    *,
+    parts: np.ndarray | None = None,
+    other_parts: np.ndarray | None = None,
 ) -> Apart:
     """How deep two posed bodies are in each other, and how the first must move to be out.
 
     Poses are of the world: positions [J, 3] m, rotations [J, 4]. The displacement is the shortest
     of :data:`DIRECTIONS` ways over the ground, the line between the bodies' middles among them;
-    after it parts are at most :data:`NEAR` deep. Errors: poses that do not fit the bodies.
+    after it parts are at most :data:`NEAR` deep. parts, other_parts: rows of the bodies that count,
+    by default all. Errors: poses that do not fit the bodies.
     """
     for b, p in ((body, position), (other, other_position)):
         if p.ndim != 2 or len(p) <= int(b.joint.max()) or not np.all(np.isfinite(p)):
             raise KumiteError(f"bodies: a pose {list(p.shape)} that does not fit its body")
-    a, b = posed(body, position, world_wxyz), posed(other, other_position, other_world_wxyz)
+    mine = np.arange(len(body)) if parts is None else np.asarray(parts)
+    its = np.arange(len(other)) if other_parts is None else np.asarray(other_parts)
+    a = tuple(x[mine] for x in posed(body, position, world_wxyz))
+    b = tuple(x[its] for x in posed(other, other_position, other_world_wxyz))
     pair = np.full(2, NO_PART, dtype=np.int64)
     scratch = (np.empty(3) for _ in range(3))
     depth = float(kernels.deepest_pair(*a, *b, 0.0, 0.0, pair, *scratch))
-    part, of_other = int(pair[0]), int(pair[1])
+    part, of_other = NO_PART, NO_PART
+    if depth > 0.0:
+        part, of_other = int(mine[pair[0]]), int(its[pair[1]])
     if depth <= NEAR:
         return Apart(depth, part, of_other, np.zeros(2))
     line = (a[0] + a[1]).mean(axis=0) - (b[0] + b[1]).mean(axis=0)

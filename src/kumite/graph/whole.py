@@ -3,12 +3,14 @@
 Nodes are postures: the poses in which actions start and end, clustered by likeness. The result is
 the same action table as that of the frame-level graph, so every controller plans on it: a state is
 the last frame of an action, its actions are all those that start in the cluster it ends in.
-Reactions are stretches of the table that no state offers: nobody chooses to be struck.
+Reactions are stretches of the table that no state offers: nobody chooses to be struck. They end
+where whoever was struck can act again, which may be long before he rests.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from scipy.cluster.hierarchy import fcluster, linkage
@@ -17,6 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial.distance import squareform
 
 from kumite.annotate import (
+    DIRECTIONS,
     KINDS,
     Actions,
     find_actions,
@@ -34,6 +37,7 @@ from kumite.kernels import distance as kernels
 from kumite.rotation import planar_compose, planar_inverse
 
 ALIKE = 1.2  # rad: poses of one cluster are nearer than that, on average (root of D)
+SHAKEN = 0.8  # s that a reaction to a hit lasts at least: then it ends with the step that is taken
 MOST_WAYS = 64  # actions that a state offers: each kind of label's best joins, turn by turn
 REST = 0.7  # s: longer rests are offered in parts
 _SPARE = 8  # rows that the kernel may write beyond the last
@@ -71,6 +75,7 @@ def build_action_library(
     strikes = only_blows(
         strikes, (which >= 0) & (strikes.frame < np.append(actions.stop[attack], 0)[which])
     )
+    actions = _recovered(actions, contacts.on_ground, clips.fps)
     progress("clustering postures")
     # An action is entered from the frame before it, where its clip has one: then what follows in
     # the capture follows here without a join.
@@ -130,6 +135,20 @@ def build_action_library(
         **{f"{kind}s": int(np.sum(keep & (actions.kind == k))) for k, kind in enumerate(KINDS)},
     }
     return Library(clips, contacts, strikes, table, report, actions)
+
+
+def _recovered(actions: Actions, on_ground: np.ndarray, fps: float) -> Actions:
+    """Actions in which a reaction to a hit ends where, :data:`SHAKEN` after it began, both feet
+    come to stand (on_ground [F, 2]); what he does from there until he rests is left out.
+    """
+    both = on_ground[:, 0] & on_ground[:, 1]
+    stands = np.flatnonzero(both[1:] & ~both[:-1]) + 1
+    begins = actions.start + round(SHAKEN * fps)
+    next_stand = np.append(stands, len(both))[np.searchsorted(stands, begins)]
+    hit = (actions.kind == KINDS.index("reaction")) & (actions.direction == DIRECTIONS.index("hit"))
+    return replace(
+        actions, stop=np.where(hit, np.minimum(actions.stop, next_stand + 1), actions.stop)
+    )
 
 
 def _inside(frame: np.ndarray, first: np.ndarray, last: np.ndarray) -> int:

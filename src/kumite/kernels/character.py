@@ -87,6 +87,7 @@ class Played(NamedTuple):
     first: np.ndarray  # [L] frames of the stretches
     last: np.ndarray  # [L]
     blow_of_frame: np.ndarray  # [F, 4]
+    held: np.ndarray  # [K] bool, shows its pose of offsets as it is: no spring moves it on
     springs: Springs
     capture: Capture
     build: Build
@@ -504,6 +505,8 @@ def turned_by(x, y, z):
 def show_one(k, dt, played):
     """One frame of character k of :func:`show`."""
     f, anchor = played.frame[k], played.anchor
+    if played.held[k]:
+        dt = 0.0
     springs, capture, build = played.springs, played.capture, played.build
     offsets, poses = played.offsets, played.poses
     root_position, wxyz = poses.root_position[k], poses.wxyz[k]

@@ -1,7 +1,7 @@
 """A fight by game tree: each fighter looks ahead whenever its action has ended (Shum et al. 2012).
 
 Everything that is decided on may change between two decisions (B12). A blow that lands cuts its
-victim's action short; the struck segment gives way, and the reaction that the tree expects follows.
+victim's action short; what follows is said by :mod:`kumite.scene.reactions`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from kumite.control.game_tree import GOAL_EVERY, MEMORY, Decision, GameTree, Pla
 from kumite.errors import KumiteError, unknown
 from kumite.graph import Library
 from kumite.kernels.blow import NO_BLOW
-from kumite.kernels.game import FALL, FLINCH, NOTHING, STAGGER
+from kumite.kernels.game import FALL, NOTHING
+from kumite.scene.apart import push_apart
 from kumite.scene.controls import (
     ORDERS,
     OrderControl,
@@ -28,14 +29,13 @@ from kumite.scene.controls import (
 )
 from kumite.scene.fighters import BoutSettings
 from kumite.scene.floor import Floor, Landing
+from kumite.scene.reactions import MOST_PHYSICAL, Reactions
 from kumite.scene.recording import Event
 from kumite.scene.settings import SceneSettings
 from kumite.scene.stage import SceneObject
 from kumite.scene.story import CueSettings, Story
 
-RECOIL = 0.018  # m that a struck segment gives way per m/s of the blow
 GOALS = 25  # places ahead of which a fighter knows: 6 s
-SIZES = {FLINCH: "flinch", STAGGER: "stagger", FALL: "fall"}
 
 
 class BoutScene:
@@ -58,6 +58,7 @@ class BoutScene:
         self.names = settings.names
         self.bout = settings.bout or BoutSettings()
         self.tree = GameTree(library, self.bout.rules())
+        self.reactions = Reactions(self.tree, len(self.names), self.bout.reactions)
         self.players = [f.player() for f in settings.fighters]
         self.routes = [f.route() for f in settings.fighters]
         self._kept: dict[int, dict] = {}  # players as they were before a cue changed them
@@ -143,6 +144,7 @@ class BoutScene:
             facing = np.array([*f.position, np.radians(f.yaw_deg)]) + moved[k]
             cast.place(k, int(table.target[self.stretch[k]]), facing)
         self.floor.start()
+        self.reactions.start(self.floor)
 
     @property
     def objects(self) -> list[SceneObject]:
@@ -164,10 +166,12 @@ class BoutScene:
         self.story.step(self, self.frame / self.fps)
         for k in self.cast.waiting.tolist():
             if self._lies(k):
-                self.cast.hold(k)
+                self.cast.wait(k)
             else:
                 self._choose(k)
-        happened = self.floor.advance()
+        happened = self.reactions.advance()
+        if len(self.names) <= MOST_PHYSICAL:  # among many trunks are kept apart, limbs are not
+            push_apart(self.floor)
         self.frame += 1
         self._pass_check_points()
         if happened:
@@ -176,6 +180,12 @@ class BoutScene:
             for landing in self.floor.landings:
                 self._land(landing)
         return True
+
+    def _is_to_fall(self, k: int) -> bool:
+        """Whether a fall is asked of character k: then any blow fells it."""
+        player = self._player(k)
+        fall = self.tree.response[:, FALL]
+        return bool(player.wanted and np.any(self.tree.asked(player)[fall[fall != NOTHING]] > 0))
 
     def _lies(self, k: int) -> bool:
         """Whether character k has been knocked down for good."""
@@ -188,7 +198,8 @@ class BoutScene:
         cast, table, o = self.cast, self.library.table, int(self.floor.opponent[k])
         facing = cast.facing
         pair = (k, o)
-        local = [int(cast.frame[p] - table.first[self.stretch[p]] + 1) for p in pair]
+        late = self.reactions.late
+        local = [int(cast.frame[p] - table.first[self.stretch[p]] + 1 - late[p]) for p in pair]
         begun = (float(self.frame - local[0]), float(self.frame - local[1]))
         state = self.tree.state(
             (int(self.stretch[k]), int(self.stretch[o])),
@@ -236,6 +247,10 @@ class BoutScene:
         """Character k begins a stretch now, whatever it does."""
         chosen = np.full(len(self.names), stretch)
         self.cast.begin(np.array([k]), chosen)
+        self._does(k, stretch)
+
+    def _does(self, k: int, stretch: int) -> None:
+        """Character k is in a stretch from now on."""
         self.stretch[k] = stretch
         self._landed[k] = NO_BLOW
         self._done[k] |= {self.tree.kinds[stretch], self.tree.labels[stretch]}
@@ -243,9 +258,8 @@ class BoutScene:
     # Bodies --------------------------------------------------------------------------------------
 
     def _land(self, landing: Landing) -> None:
-        """A blow has landed: say so, let the struck segment give, and react to it."""
-        body, tree = self.floor.body, self.tree
-        part = body.parts[landing.part]
+        """A blow has landed: say so, and react to it."""
+        part = self.floor.body.parts[landing.part]
         speed = float(np.linalg.norm(landing.velocity))
         blocked = part in ARMS
         self._landed[landing.who] = landing.blow
@@ -261,22 +275,14 @@ class BoutScene:
             blocked=blocked,
             blow=landing.blow,
         )
-        joint = int(body.joint[landing.part])
-        self.cast.strike(landing.victim, joint, landing.place, RECOIL * landing.velocity)
-        if blocked:
+        if self._lies(landing.victim):
             return
-        rules = tree.rules
-        size = FALL if speed >= rules.fall_from else int(speed >= rules.stagger_from)
-        row = tree.response[int(part in ("head", "neck"))]
-        if row[FALL] != NOTHING and tree.asked(self._player(landing.victim))[row[FALL]] > 0:
-            size = FALL  # it is asked for
-        self._react(landing.victim, int(row[size]), size)
-
-    def _react(self, k: int, response: int, size: int) -> None:
-        if response == NOTHING or self._lies(k):
+        reaction = self.reactions.react(landing, blocked, self._is_to_fall(landing.victim))
+        if reaction is None:
             return
-        self._begin(k, response)
-        self._event("reaction", k, action=self.tree.labels[response], size=SIZES[size])
+        begin = self._does if reaction.begun else self._begin
+        begin(landing.victim, reaction.stretch)
+        self._event("reaction", landing.victim, **reaction.told)
 
     # The story -----------------------------------------------------------------------------------
 
@@ -304,11 +310,14 @@ class BoutScene:
     def run_over(self, k: int, by: str, speed: float) -> None:
         """Character k falls, struck by a vehicle."""
         self._event("run over", k, by=by, speed=round(speed, 3))
-        self._react(k, int(self.tree.response[0, FALL]), FALL)
+        fall = int(self.tree.response[0, FALL])
+        if fall != NOTHING and not self._lies(k):
+            self.reactions.forget(k)
+            self._begin(k, fall)
 
-    def carry(self, k: int, by: np.ndarray) -> None:
-        """Character k is moved [2] m over the ground."""
-        self.cast.anchor[k, :2] += by
+    def drag(self, k: int, way: np.ndarray) -> None:
+        """Character k is moved over the ground by way [2] m, feet and all."""
+        self.cast.anchor[k, :2] += way
 
     # Check points --------------------------------------------------------------------------------
 

@@ -148,7 +148,8 @@ class BoutSettings(Settings):
     scatter_deg: Annotated[Finite, Field(ge=0, le=180)] = 0.0  # and turns them
     stagger_from: Positive = 5.2  # m/s of a blow
     fall_from: Positive = 10.0  # m/s
+    reactions: Literal["physical", "kinematic", "auto"] = "auto"  # what moves a struck body
 
     def rules(self) -> Rules:
-        values = self.model_dump(exclude={"library", "facing_deg", "scatter", "scatter_deg"})
-        return Rules(facing=radians(self.facing_deg), **values)
+        apart = {"library", "facing_deg", "scatter", "scatter_deg", "reactions"}
+        return Rules(facing=radians(self.facing_deg), **self.model_dump(exclude=apart))

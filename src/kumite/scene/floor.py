@@ -16,7 +16,7 @@ from kumite.kernels.character import MANY
 from kumite.synthesis import Cast
 
 TARGET_PARTS = ("head", "neck", "chest", "waist", *ARMS)
-CLOSEST = 0.40  # m between two pelvises under which bodies are pushed apart
+CLOSEST = 0.40  # m between two pelvises under which bodies are pushed apart, whatever they do
 PUSH_SPEED = 0.5  # m/s, at most, of that push: slow enough not to be seen as a jump
 
 

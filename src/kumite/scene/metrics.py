@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 from kumite.clip import SIDES, Skeleton, facing_frame, forward_kinematics
 from kumite.graph import Library
 from kumite.rotation import wrap_angle
-from kumite.scene.recording import Event, Recording
+from kumite.scene.recording import NO_FRAME, Event, Recording
 
 FACING_WITHIN = np.radians(45.0)
 
@@ -102,7 +102,9 @@ def measure(recording: Recording) -> Metrics:
             d = aimed - facing[k][:, :2]
             off = wrap_angle(np.arctan2(d[:, 0], d[:, 1]) - facing[k][:, 2])
             share = float(np.mean(np.abs(off) <= FACING_WITHIN))
-        jump = np.flatnonzero(np.diff(recording.library_frame[:, k]) != 1) + 1
+        shown = recording.library_frame[:, k]
+        physical = (shown[1:] == NO_FRAME) & (shown[:-1] == NO_FRAME)
+        jump = np.flatnonzero((np.diff(shown) != 1) & ~physical) + 1
         speed = np.linalg.norm(np.diff(positions[k][:, 0], axis=0), axis=1) * fps
         inner = jump[(jump >= 2) & (jump < len(recording))]
         change = np.abs(speed[inner - 1] - speed[inner - 2])

@@ -11,7 +11,7 @@ from kumite.scene.bout import BoutScene
 from kumite.scene.live import LiveScene
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.metrics import source_skate
-from kumite.scene.recording import Event, Recording
+from kumite.scene.recording import NO_FRAME, Event, Recording
 
 MOST_BYTES = 16e9  # of one recording
 
@@ -48,7 +48,7 @@ def record(
         root[f] = scene.root_position
         wxyz[f] = scene.wxyz
         contacts[f] = scene.cast.contacts
-        shown[f] = scene.cast.frame
+        shown[f] = np.where(scene.cast.held, NO_FRAME, scene.cast.frame)
         for o, thing in enumerate(scene.objects):
             things[f, o] = thing.position
         if f % 256 == 0:

@@ -101,8 +101,8 @@ class Actors(Protocol):
         """Character k falls."""
         ...
 
-    def carry(self, k: int, by: np.ndarray) -> None:
-        """Character k is moved [2] m over the ground."""
+    def drag(self, k: int, way: np.ndarray) -> None:
+        """Character k is moved over the ground by way [2] m, feet and all."""
         ...
 
 
@@ -184,4 +184,4 @@ class Vehicle:
             if k not in self._struck:
                 self._struck.add(k)
                 scene.run_over(k, self.settings.name, self.speed)
-            scene.carry(k, (front - seen[k, 2]) * self.ahead)
+            scene.drag(k, (front - seen[k, 2]) * self.ahead)

@@ -2,10 +2,18 @@
 
 from kumite.synthesis.cast import Cast
 from kumite.synthesis.moment import Moment
-from kumite.synthesis.ragdoll import Pushed, Ragdoll, Tone, blow_impulse
+from kumite.synthesis.ragdoll import (
+    EFFECTIVE_MASS,
+    Pushed,
+    Ragdoll,
+    Tone,
+    blow_impulse,
+    has_physics,
+)
 from kumite.synthesis.response import Responses, find_responses
 
 __all__ = [
+    "EFFECTIVE_MASS",
     "Cast",
     "Moment",
     "Pushed",
@@ -14,4 +22,5 @@ __all__ = [
     "Tone",
     "blow_impulse",
     "find_responses",
+    "has_physics",
 ]

@@ -62,6 +62,8 @@ class Cast:
             *(np.zeros((count, *shape)) for shape in shapes for _ in ("offset", "velocity"))
         )
         self.jump = np.zeros(count, dtype=bool)  # whether the last action began with a join
+        self.held = np.zeros(count, dtype=bool)  # shows poses handed to it, until it adopts one
+        self.stands = np.zeros((count, 2), dtype=bool)  # on which feet it does so
         self.played = kernels.Played(
             self.frame,
             self.stop,
@@ -70,6 +72,7 @@ class Cast:
             library.table.first,
             library.table.last,
             blow_windows(library),
+            self.held,
             SPRINGS,
             capture,
             build,
@@ -80,7 +83,8 @@ class Cast:
     @property
     def contacts(self) -> np.ndarray:
         """Which feet are planted now [K, 2] bool."""
-        return self.library.contacts.on_ground[self.frame]
+        on_ground = self.library.contacts.on_ground[self.frame]
+        return np.where(self.held[:, None], self.stands, on_ground)
 
     @property
     def facing(self) -> np.ndarray:
@@ -96,6 +100,7 @@ class Cast:
         """Put a character into a state (of the action table) at a facing frame, at rest."""
         f = int(self.library.table.state_frame[state])
         self.frame[k] = self.stop[k] = f
+        self.held[k] = False
         self.anchor[k] = planar_compose(facing, planar_inverse(self.library.clips.facing[f]))
         for array in self._offsets:
             array[k] = 0.0
@@ -104,17 +109,60 @@ class Cast:
         """Characters who [W] take actions, stretches [K], from the states they are in."""
         kernels.begin(who, stretch, self.played)
 
-    def hold(self, k: int) -> None:
+    def wait(self, k: int) -> None:
         """A character whose action has ended stays as it is for another step."""
         self.frame[k] = self.stop[k] - 1
 
-    def adopt(self, k: int, frame: int, last: int, now: Moment) -> None:
+    def foresee(self, k: int, frames: int, alone: Cast) -> tuple[np.ndarray, np.ndarray]:
+        """Roots [T, 3] and rotations [T, J, 4] that a character would show next, undisturbed.
+
+        T is ``frames``, or fewer where its action ends before; at its end, what it shows now.
+        alone: a cast of one from the same library, to try it on.
+        """
+        alone.frame[0], alone.stop[0] = self.frame[k], self.stop[k]
+        alone.anchor[0] = self.anchor[k]
+        for mine, theirs in zip(alone._offsets, self._offsets):
+            mine[0] = theirs[k]
+        roots, turns = [], []
+        for _ in range(min(frames, int(self.stop[k] - self.frame[k]))):
+            alone.advance()
+            roots.append(alone.root_position[0].copy())
+            turns.append(alone.wxyz[0].copy())
+        if not roots:
+            return self.root_position[k, None].copy(), self.wxyz[k, None].copy()
+        return np.array(roots), np.array(turns)
+
+    def hold(
+        self,
+        k: int,
+        frame: int,
+        root_position: np.ndarray,
+        wxyz: np.ndarray,
+        ankles: np.ndarray,
+        stands: np.ndarray,
+    ) -> None:
+        """Let a character show a pose ([3] m, [J, 4]) in the next frame, whatever it plays.
+
+        ankles [2, 3] m: where its legs reach to; stands [2] bool: on which feet it stands. The
+        pose counts as library frame ``frame`` and its anchor stays. So from frame to frame, until
+        :meth:`adopt`.
+        """
+        still = np.zeros((1 + len(wxyz), 3))
+        self.frame[k] = frame
+        self._take(k, root_position, wxyz, still, ankles, still[:2])
+        self.frame[k] -= 1  # the frame that comes moves it on
+        self.held[k], self.stands[k] = True, stands
+
+    def adopt(
+        self, k: int, frame: int, last: int, now: Moment, ankles: np.ndarray | None = None
+    ) -> None:
         """Let a character go on from a pose of its own along library frames.
 
         It stands where ``now`` does, shows that pose at its next :meth:`show` of no time, and from
         there plays the frames after ``frame`` up to ``last`` (where it waits for a choice):
         the facing frames lie on each other, pose and velocity are continuous, and what differs
-        fades as after a join. Errors: frames that are no stretch of one clip; another skeleton.
+        fades as after a join. ankles [2, 3] m: where its legs reach to, if not where the pose has
+        them. Errors: frames that are no stretch of one clip; another skeleton.
         """
         clips = self.library.clips
         if not (0 <= frame <= last < len(clips)) or (
@@ -126,18 +174,29 @@ class Cast:
                 f"cast: a pose of {len(now.wxyz)} joints, expected {len(clips.skeleton)}"
             )
         facing = facing_frame(clips.skeleton, now.root_position[None], now.wxyz[None])[0]
-        self.frame[k], self.stop[k] = frame, last
+        self.frame[k], self.stop[k], self.held[k] = frame, last, False
         self.anchor[k] = planar_compose(facing, planar_inverse(clips.facing[frame]))
         position, velocity = now.joints(clips.skeleton)
         feet = [clips.skeleton.joint(f"{side}_foot") for side in SIDES]
+        self._take(
+            k,
+            now.root_position,
+            now.wxyz,
+            np.concatenate([now.root_velocity[None], now.joint_velocity]),
+            position[feet] if ankles is None else ankles,
+            velocity[feet],
+        )
+
+    def _take(self, k: int, root_position, wxyz, moving, ankles, stepping) -> None:
+        """Offsets that show a pose, and how it moves, at the library frame where k is."""
         kernels.adopt(
             k,
-            frame,
+            int(self.frame[k]),
             self.anchor,
-            np.concatenate([[[*now.root_position, 0.0]], now.wxyz]),
-            np.concatenate([now.root_velocity[None], now.joint_velocity]),
-            position[feet],
-            velocity[feet],
+            np.concatenate([[[*root_position, 0.0]], wxyz]),
+            moving,
+            ankles,
+            stepping,
             self.played.capture,
             self._offsets,
         )
@@ -156,6 +215,11 @@ class Cast:
     def foot_offset(self) -> np.ndarray:
         """How far [K, 2, 3] planted feet are held from where the capture has them [m]."""
         return self._offsets.foot
+
+    def carry(self, k: int, way: np.ndarray) -> None:
+        """Carry a character away over the ground by way [2] m; planted feet stay where they are."""
+        self.anchor[k, :2] += way
+        self._offsets.foot[k][:, [0, 2]] -= way
 
     def strike(self, k: int, joint: int, point: np.ndarray, displacement: np.ndarray) -> None:
         """Displace a struck segment: ``point`` moves by about ``displacement`` [3] and recovers.

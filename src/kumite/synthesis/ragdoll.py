@@ -114,6 +114,15 @@ def blow_impulse(velocity: np.ndarray, limb: str = "hand") -> np.ndarray:
     return EFFECTIVE_MASS[mjcf.kind_of(limb)] * np.asarray(velocity, dtype=np.float64)
 
 
+def has_physics() -> bool:
+    """Whether MuJoCo is installed."""
+    try:
+        _mujoco()
+    except KumiteError:
+        return False
+    return True
+
+
 def _mujoco() -> Any:
     try:
         import mujoco

@@ -105,10 +105,12 @@ class Responses:
         *,
         stagger_from: float = STAGGER_FROM,
         fall_from: float = FALL_FROM,
+        hurry: float = 0.0,
     ) -> tuple[int, float]:
         """The entry to take, and its cost: the cheapest of the size that the impulse asks for.
 
-        now: where the blow has left the body (``Pushed.end``); impulse [3] N s: of the blow.
+        now: where the blow has left the body (``Pushed.end``); impulse [3] N s: of the blow; hurry:
+        cost of each frame that a response goes on.
         Errors: a pose of another skeleton; an impulse that is not finite.
         """
         impulse = np.asarray(impulse, dtype=np.float64)
@@ -119,7 +121,8 @@ class Responses:
         if impulse.shape != (3,) or not np.all(np.isfinite(impulse)):
             raise KumiteError("responses: the impulse must be 3 finite numbers")
         size = self.size_for(float(np.linalg.norm(impulse)), stagger_from, fall_from)
-        cost = np.where(self.size == size, self.costs(now, impulse), np.inf)
+        cost = self.costs(now, impulse) + hurry * (self.last - self.frame)
+        cost[self.size != size] = np.inf
         index = int(np.argmin(cost))
         return index, float(cost[index])
 
