@@ -17,7 +17,7 @@ from kumite.control.game_tree import MEMORY, Decision, GameTree, Player
 from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.kernels.blow import NO_BLOW
-from kumite.kernels.game import FALL, FLINCH, NOTHING, STAGGER
+from kumite.kernels.moves import FALL, FLINCH, NOTHING, STAGGER
 from kumite.scene.fighters import BoutSettings
 from kumite.scene.floor import Floor, Landing
 from kumite.scene.recording import Event
