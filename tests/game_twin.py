@@ -98,7 +98,7 @@ class Toy:
     def game(self) -> kernels.Game:
         moves = self.moves
         tips = [tip for move in moves for tip in move.tips]
-        hull, trunk, girth, reach = zip(*(self.bounds(m) for m in moves))
+        hull, trunk, ring, reach = zip(*(self.bounds(m) for m in moves))
         end = np.array([m.track[-1, 2] for m in moves])
         weights = np.stack([side.style.as_array() for side in self.sides])
         asked, goal = np.zeros((2, len(moves))), np.zeros((2, 2))
@@ -129,11 +129,12 @@ class Toy:
             self.radius,
             self.radius[:4],
             np.array(hull, float),
-            np.array(girth, float),
+            np.concatenate(ring),
             np.concatenate([[0], np.cumsum([len(m.tips) for m in moves])]).astype(np.int64),
             np.array([tip.when for tip in tips], np.int64),
             np.array([tip.at for tip in tips], float).reshape(-1, 3),
             np.array([tip.before for tip in tips], float).reshape(-1, 3),
+            np.array([math.dist(tip.at, tip.before) + 1e-6 for tip in tips], float),
             np.array([tip.speed for tip in tips], float),
             np.array([tip.blow for tip in tips], np.int64),
             np.array(last, np.int64),
@@ -156,7 +157,7 @@ class Toy:
         )
 
     def bounds(self, move: Move):
-        """Circles about the body and, row by row, the trunk; the girth; a circle about the tips."""
+        """Circles about the body and, row by row, the trunk and the body; one about the tips."""
         ground = move.body[..., ::2].astype(float)
         far = np.linalg.norm(ground, axis=-1) + self.radius
         off = np.linalg.norm(ground - move.track[:, None, :2], axis=-1) + self.radius
@@ -166,7 +167,7 @@ class Toy:
         return (
             (0, 0, far.max() + 1e-6),
             trunk,
-            off.max() + 1e-6,
+            np.column_stack([move.track[:, :2], off.max(axis=1) + 1e-6]),
             (0, 0, max(tips, default=0.0) + 1e-6),
         )
 

@@ -316,7 +316,7 @@ def _moves(library: Library) -> kernels.Moves:
     ground = places[..., [0, 2]].astype(float)
     trunk = _circles(ground[:, : len(TRUNK)], bulk, np.arange(len(track)))
     hull = _circles(ground, radius, start[:-1])
-    off = np.linalg.norm(ground - track[:, None, :2], axis=-1) + radius
+    ring = _circles(ground, radius, np.arange(len(track)))
     end = track[start[1:] - 1, 2]
     windows = blow_windows(library)
     row, limb = np.nonzero((windows[frame] != NO_BLOW) & (local > 0)[:, None])
@@ -330,7 +330,7 @@ def _moves(library: Library) -> kernels.Moves:
     striking, first = np.unique(owner[row], return_index=True)
     ways = np.stack([now, before], axis=1)[..., [0, 2]]
     reach[striking] = _circles(ways, np.zeros(2), first)
-    speed = np.linalg.norm(now - before, axis=1) * clips.fps
+    way = np.linalg.norm(now - before, axis=1)
     last_tip = np.full(len(duration), NOTHING)
     np.maximum.at(last_tip, owner[row], local[row])
     actions, action = library.actions, library.action_of_stretch
@@ -354,12 +354,13 @@ def _moves(library: Library) -> kernels.Moves:
         radius,
         bulk,
         hull,
-        np.maximum.reduceat(off.max(axis=1), start[:-1]) + SLACK,
+        ring,
         np.searchsorted(owner[row], np.arange(len(duration) + 1)).astype(np.int64),
         local[row].astype(np.int64),
         np.ascontiguousarray(now),
         np.ascontiguousarray(before),
-        speed,
+        way + SLACK,
+        way * clips.fps,
         _ranks(library)[windows[frame[row], limb]],
         last_tip.astype(np.int64),
         reach,

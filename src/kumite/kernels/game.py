@@ -35,6 +35,7 @@ from kumite.kernels.moves import (
     next_player,
     parts,
     place_at,
+    inverse,
     seen_from,
     touch,
 )
@@ -57,40 +58,32 @@ from kumite.kernels.style import (
 
 
 @kernel
-def contact(state, p, since, until, moves, rules):
-    """The first tip of player p that meets the opponent after ``since``, no later than ``until``.
+def meets(k, begun, landed, other, other_begun, frame, since, until, moves, rules):
+    """The first tip of stretch k, of a blow after ``landed``, that meets the body of ``other``
+    after ``since``, no later than ``until``; both begun then. frame: k's, seen from the other's.
 
     Returns (tip or NOTHING, sphere). Arms are met where they are in the way at that frame.
     """
-    a, v = p * FIELDS, (1 - p) * FIELDS
-    k, other = int(state[a + STRETCH]), int(state[v + STRETCH])
-    yaw = state[a + YAW] - state[v + YAW]
-    c, s = np.cos(yaw), np.sin(yaw)
-    x, z = state[a + X] - state[v + X], state[a + Z] - state[v + Z]
-    cv, sv = np.cos(state[v + YAW]), np.sin(state[v + YAW])
-    x, z = cv * x - sv * z, sv * x + cv * z  # the attacker's frame, seen from the victim's
-    u, w = carried((x, z, c, s), moves.reach[k, 0], moves.reach[k, 1])
+    u, w = carried(frame, moves.reach[k, 0], moves.reach[k, 1])
     if not touch(u, w, moves.reach[k, 2], moves.hull, other, rules.tip_radius):
         return NOTHING, NOTHING
-    body, radius, when = moves.body, moves.radius, moves.tip_when
-    tip, before = moves.tip, moves.tip_before
+    body, radius, ring, when = moves.body, moves.radius, moves.ring, moves.tip_when
+    tip, before, way = moves.tip, moves.tip_before, moves.tip_way
+    first, last = moves.start[other], moves.duration[other]
     for n in range(moves.tip_start[k], moves.tip_start[k + 1]):
-        time = state[a + BEGUN] + when[n]
-        if time <= since or moves.tip_blow[n] <= state[a + LANDED]:
+        time = begun + when[n]
+        if time <= since or moves.tip_blow[n] <= landed:
             continue
         if time > until:
             break
-        i = min(max(int(time - state[v + BEGUN]), 0), moves.duration[other])
-        row = moves.start[other] + i
-        px, pz = carried((x, z, c, s), tip[n, 0], tip[n, 2])
-        qx, qz = carried((x, z, c, s), before[n, 0], before[n, 2])
+        row = first + min(max(int(time - other_begun), 0), last)
+        px, pz = carried(frame, tip[n, 0], tip[n, 2])
+        if not touch(px, pz, way[n], ring, row, rules.tip_radius):
+            continue
+        qx, qz = carried(frame, before[n, 0], before[n, 2])
         py, qy = tip[n, 1], before[n, 1]
         ux, uy, uz = px - qx, py - qy, pz - qz  # the way of the tip in this frame
         way2 = ux * ux + uy * uy + uz * uz + 1e-12
-        dx, dz = px - moves.track[row, 0], pz - moves.track[row, 1]
-        far = moves.girth[other] + rules.tip_radius + np.sqrt(way2)
-        if dx * dx + dz * dz > far * far:
-            continue
         met, soonest = NOTHING, 2.0
         for b in range(radius.shape[0]):
             wx, wy, wz = body[row, b, 0] - qx, body[row, b, 1] - qy, body[row, b, 2] - qz
@@ -109,6 +102,17 @@ def contact(state, p, since, until, moves, rules):
         if met != NOTHING:
             return n, met
     return NOTHING, NOTHING
+
+
+@kernel
+def contact(state, p, since, until, moves, rules):
+    """The first tip of player p that meets the opponent after ``since``, no later than ``until``:
+    :func:`meets`."""
+    a, v = p * FIELDS, (1 - p) * FIELDS
+    frame = seen_from(state, p, state[v + X], state[v + Z], state[v + YAW])
+    k, begun, landed = int(state[a + STRETCH]), state[a + BEGUN], state[a + LANDED]
+    other, other_begun = int(state[v + STRETCH]), state[v + BEGUN]
+    return meets(k, begun, landed, other, other_begun, frame, since, until, moves, rules)
 
 
 @kernel
@@ -148,18 +152,18 @@ def caught(state, chosen, since, until, moves, rules):
 
 
 @kernel
-def play_on(state, chosen, both, moves, rules, want):
-    """What happens after ``chosen`` until someone chooses, or, with ``both``, until both have ended.
+def play_on(state, before, chosen, until, moves, rules, want):
+    """What happens after ``chosen`` until someone chooses, and on to ``until`` or both have ended.
 
     Returns what player 0 and player 1 dealt, weighted by their own w⁺, what they dealt unweighted
     (D of Eq. 6), coop of reactions, and whether one was caught before someone chooses. ``state`` is
-    changed by reactions.
+    changed by reactions. before [STATE]: room.
     """
     since, near = chosen, False
     score0, score1, dealt0, dealt1, coop = 0.0, 0.0, 0.0, 0.0, 0.0
     while True:
         one, two = state[END], state[FIELDS + END]
-        to = max(one, two) if both else min(one, two)
+        to = max(min(one, two), min(until, max(one, two)))
         when = np.inf
         n0, part0, n1, part1 = NOTHING, NOTHING, NOTHING, NOTHING
         for p in range(2):
@@ -175,27 +179,31 @@ def play_on(state, chosen, both, moves, rules, want):
                 n0, part0 = n, part
             else:
                 n1, part1 = n, part
-        if not both and not near:
+        if not near:
             near = caught(state, chosen, since, min(when, to), moves, rules)
         if when == np.inf:
             return score0, score1, dealt0, dealt1, coop, near
         since = when
-        # Blows of one frame both land: where both were before them counts.
-        k0, k1 = int(state[STRETCH]), int(state[FIELDS + STRETCH])
-        x0, z0, yaw0 = place_at(state, 0, when, moves)
-        x1, z1, yaw1 = place_at(state, 1, when, moves)
+        # Blows of one frame both land: the state before it counts for both.
+        for s in range(STATE):
+            before[s] = state[s]
         if n0 != NOTHING:
             state[LANDED] = moves.tip_blow[n0]
         if n1 != NOTHING:
             state[FIELDS + LANDED] = moves.tip_blow[n1]
-        if n0 != NOTHING:
-            damage, asked = land(state, 0, n0, part0, when, x1, z1, yaw1, moves, rules, want)
-            worth = want.weights[0, GIVEN_SHORT if moves.short[k0] else GIVEN_LONG]
-            score0, dealt0, coop = score0 + damage * worth, dealt0 + damage, coop + asked
-        if n1 != NOTHING:
-            damage, asked = land(state, 1, n1, part1, when, x0, z0, yaw0, moves, rules, want)
-            worth = want.weights[1, GIVEN_SHORT if moves.short[k1] else GIVEN_LONG]
-            score1, dealt1, coop = score1 + damage * worth, dealt1 + damage, coop + asked
+        for p in range(2):
+            n, part = (n0, part0) if p == 0 else (n1, part1)
+            if n == NOTHING:
+                continue
+            x, z, yaw = place_at(before, 1 - p, when, moves)
+            damage, asked = land(state, p, n, part, when, x, z, yaw, moves, rules, want)
+            short = moves.short[int(before[p * FIELDS + STRETCH])]
+            worth = damage * want.weights[p, GIVEN_SHORT if short else GIVEN_LONG]
+            coop += asked
+            if p == 0:
+                score0, dealt0 = score0 + worth, dealt0 + damage
+            else:
+                score1, dealt1 = score1 + worth, dealt1 + damage
 
 
 @kernel
@@ -223,13 +231,13 @@ def movement(state, p, moves, want):
 
 
 @kernel
-def edge(state, p, moves, rules, want):
+def edge(state, before, p, moves, rules, want):
     """What it adds in ``state`` that player p has begun a stretch: comp, coop as p sees them.
 
     ``state`` becomes that of the next choice.
     """
     score0, score1, dealt0, dealt1, coop, near = play_on(
-        state, state[p * FIELDS + BEGUN], False, moves, rules, want
+        state, before, state[p * FIELDS + BEGUN], -np.inf, moves, rules, want
     )
     given, taken = (score0, dealt1) if p == 0 else (score1, dealt0)
     if near:
@@ -256,9 +264,8 @@ def expand(game, state, children):
     first, last = moves.start[opposing] + done, moves.duration[opposing] - done
     frame = seen_from(state, q, x, z, yaw)
     attacked = moves.kind[opposing] == ATTACK and begun + moves.last_tip[opposing] >= time
-    hull, reach = moves.hull, moves.reach
-    hull_x, hull_z = carried(frame, hull[opposing, 0], hull[opposing, 1])
-    reach_x, reach_z = carried(frame, reach[opposing, 0], reach[opposing, 1])
+    landed = state[q * FIELDS + LANDED]
+    back = inverse(frame)
     way = way_of(first, last, frame, moves, rules.stride)
     flaws = np.empty(stretches.shape[0], dtype=np.int64)
     for hasty in (True, False):
@@ -280,6 +287,7 @@ def expand(game, state, children):
     limit = worst_allowed(flaws)
     action, comps, coops, states = children.action, children.comp, children.coop, children.state
     weights, sign = want.weights, 1.0 if p == 0 else -1.0
+    before = np.empty(STATE)
     coop_too = weights[p, PLACE] != 0.0 or weights[p, HEADING] != 0.0
     count = 0
     for n in range(stretches.shape[0]):
@@ -289,12 +297,12 @@ def expand(game, state, children):
         for f in range(STATE):
             states[count, f] = state[f]
         begin(states[count], p, k, time, x, z, yaw, moves)
-        quiet = not (
-            moves.last_tip[k] != NOTHING
-            and touch(hull_x, hull_z, hull[opposing, 2], reach, k, rules.tip_radius)
-        ) and not (
-            due and touch(reach_x, reach_z, reach[opposing, 2], hull, k, rules.tip_radius)
-        )
+        met = NOTHING
+        if moves.last_tip[k] != NOTHING:
+            met, _ = meets(k, time, NOTHING, opposing, begun, back, time, np.inf, moves, rules)
+        if met == NOTHING and due:
+            met, _ = meets(opposing, begun, landed, k, time, frame, time, np.inf, moves, rules)
+        quiet = met == NOTHING
         states[count, QUIET] = 1.0 if quiet else 0.0
         if quiet and rules.catch == 0.0 and not coop_too:
             row, other = moves.start[k] + moves.duration[k], first + min(moves.duration[k], last)
@@ -302,7 +310,7 @@ def expand(game, state, children):
             u, w = u - moves.track[row, 0], w - moves.track[row, 1]
             comp, coop = closeness(weights, p, u, w, moves.track[row, 2]), 0.0
         else:
-            comp, coop = edge(states[count], p, moves, rules, want)
+            comp, coop = edge(states[count], before, p, moves, rules, want)
         comp += weights[p, SUITABILITY] * want.suits[k, opposing]
         action[count], comps[count] = k, sign * comp
         coops[count] = coop + weights[p, REQUIREMENT] * want.asked[p, k]
@@ -316,12 +324,13 @@ def expand(game, state, children):
 def leaves(game, children, count):
     """What is begun is played to its end, with nobody choosing anything more."""
     moves, rules, want = parts(game)
+    before = np.empty(STATE)
     for n in range(count):
         if children.state[n, QUIET] != 0.0:
             continue
         state = children.state[n]
         since = min(state[END], state[FIELDS + END])
-        score0, _, dealt0, dealt1, coop, _ = play_on(state, since, True, moves, rules, want)
+        score0, _, dealt0, dealt1, coop, _ = play_on(state, before, since, np.inf, moves, rules, want)
         if dealt0 > 0.0 or dealt1 > 0.0:
             children.comp[n] += score0 - want.weights[0, TAKEN] * dealt1
         children.coop[n] += coop

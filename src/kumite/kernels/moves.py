@@ -44,11 +44,12 @@ class Moves(NamedTuple):
     radius: np.ndarray  # [B] m, met by a tip
     bulk: np.ndarray  # [TRUNK] m, kept from the other trunk: arms are held before it
     hull: np.ndarray  # [L, 3] circles that hold the body from the beginning to the end
-    girth: np.ndarray  # [L] m from the facing frame to the rim of a sphere on the ground, at most
+    ring: np.ndarray  # [R, 3] circles that hold the body
     tip_start: np.ndarray  # [L + 1]
     tip_when: np.ndarray  # [P] frames since the beginning, ascending in a stretch
     tip: np.ndarray  # [P, 3] m
     tip_before: np.ndarray  # [P, 3] m, a frame earlier: nothing skips through
+    tip_way: np.ndarray  # [P] m in that frame, and a little more
     tip_speed: np.ndarray  # [P] m/s
     tip_blow: np.ndarray  # [P] number of the blow, ascending in time
     last_tip: np.ndarray  # [L] frames, or NOTHING
@@ -103,11 +104,12 @@ def parts(game):
             game.radius,
             game.bulk,
             game.hull,
-            game.girth,
+            game.ring,
             game.tip_start,
             game.tip_when,
             game.tip,
             game.tip_before,
+            game.tip_way,
             game.tip_speed,
             game.tip_blow,
             game.last_tip,
@@ -182,6 +184,13 @@ def carried(frame, x, z):
     """A point of a frame (:func:`seen_from`) seen from without."""
     u, w, c, s = frame
     return u + c * x + s * z, w - s * x + c * z
+
+
+@kernel
+def inverse(frame):
+    """The frame from which a frame is seen, seen from there."""
+    u, w, c, s = frame
+    return s * w - c * u, -s * u - c * w, c, -s
 
 
 @kernel
