@@ -125,7 +125,7 @@ class Toy:
             np.concatenate([m.track for m in moves]).astype(float),
             np.stack([np.sin(end), np.cos(end)], axis=1),
             np.concatenate(trunk),
-            np.concatenate([m.body for m in moves]),
+            np.concatenate([m.body for m in moves]).swapaxes(1, 2).copy(),
             self.radius,
             self.radius[:4],
             np.array(hull, float),

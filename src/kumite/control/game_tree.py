@@ -350,7 +350,7 @@ def _moves(library: Library) -> kernels.Moves:
         np.ascontiguousarray(track),
         np.stack([np.sin(end), np.cos(end)], axis=1),
         trunk,
-        places,
+        np.ascontiguousarray(places.swapaxes(1, 2)),
         radius,
         bulk,
         hull,

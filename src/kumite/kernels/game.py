@@ -24,6 +24,7 @@ from kumite.kernels.moves import (
     LANDED,
     NOTHING,
     QUIET,
+    SPHERES,
     STAGGER,
     STATE,
     STRETCH,
@@ -84,9 +85,18 @@ def meets(k, begun, landed, other, other_begun, frame, since, until, moves, rule
         py, qy = tip[n, 1], before[n, 1]
         ux, uy, uz = px - qx, py - qy, pz - qz  # the way of the tip in this frame
         way2 = ux * ux + uy * uy + uz * uz + 1e-12
+        mx, my, mz = px - 0.5 * ux, py - 0.5 * uy, pz - 0.5 * uz
+        reached = rules.tip_radius + 0.5 * way[n]
+        near = False
+        for b in range(SPHERES):  # without branches: all at once
+            wx, wy, wz = body[row, 0, b] - mx, body[row, 1, b] - my, body[row, 2, b] - mz
+            r = radius[b] + reached
+            near |= wx * wx + wy * wy + wz * wz < r * r
+        if not near:
+            continue
         met, soonest = NOTHING, 2.0
-        for b in range(radius.shape[0]):
-            wx, wy, wz = body[row, b, 0] - qx, body[row, b, 1] - qy, body[row, b, 2] - qz
+        for b in range(SPHERES):
+            wx, wy, wz = body[row, 0, b] - qx, body[row, 1, b] - qy, body[row, 2, b] - qz
             r = radius[b] + rules.tip_radius
             nearest = (wx * ux + wy * uy + wz * uz) / way2
             along = min(max(nearest, 0.0), 1.0)
@@ -297,14 +307,17 @@ def expand(game, state, children):
         for f in range(STATE):
             states[count, f] = state[f]
         begin(states[count], p, k, time, x, z, yaw, moves)
-        met = NOTHING
+        hit = np.inf  # when first something meets, if both go on
         if moves.last_tip[k] != NOTHING:
-            met, _ = meets(k, time, NOTHING, opposing, begun, back, time, np.inf, moves, rules)
-        if met == NOTHING and due:
-            met, _ = meets(opposing, begun, landed, k, time, frame, time, np.inf, moves, rules)
-        quiet = met == NOTHING
-        states[count, QUIET] = 1.0 if quiet else 0.0
-        if quiet and rules.catch == 0.0 and not coop_too:
+            met, _ = meets(k, time, NOTHING, opposing, begun, back, time, hit, moves, rules)
+            if met != NOTHING:
+                hit = time + moves.tip_when[met]
+        if due:
+            met, _ = meets(opposing, begun, landed, k, time, frame, time, hit, moves, rules)
+            if met != NOTHING:
+                hit = begun + moves.tip_when[met]
+        states[count, QUIET] = 1.0 if hit == np.inf else 0.0
+        if hit > min(state[q * FIELDS + END], time + moves.duration[k]) and rules.catch == 0.0 and not coop_too:
             row, other = moves.start[k] + moves.duration[k], first + min(moves.duration[k], last)
             u, w = carried(frame, moves.track[other, 0], moves.track[other, 1])
             u, w = u - moves.track[row, 0], w - moves.track[row, 1]

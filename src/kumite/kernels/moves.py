@@ -20,6 +20,7 @@ QUIET = 2 * FIELDS  # 1 where no tip can meet anything if both go on as they do,
 STATE = 2 * FIELDS + 1
 NOTHING = -1
 TRUNK = 4  # spheres that must not overlap: head, chest, belly, pelvis; the rest are arms
+SPHERES = 8  # B: the trunk's, forearms and gloves
 HEAD = 0
 IDLE, ATTACK, DEFENCE, OTHER = range(4)
 ILLOGICAL, TOO_FAR, TURNED_AWAY, OVERLAPS, ENDS_INSIDE = 1, 2, 4, 8, 16
@@ -40,7 +41,7 @@ class Moves(NamedTuple):
     track: np.ndarray  # [R, 3] facing frames (x, z, yaw)
     heading: np.ndarray  # [L, 2] sine and cosine of the yaw at the end
     trunk: np.ndarray  # [R, 3] circles that hold the trunk's spheres, as bulky as they are kept
-    body: np.ndarray  # [R, B, 3] m, float32, centres of spheres
+    body: np.ndarray  # [R, 3, B] m, float32, centres of spheres
     radius: np.ndarray  # [B] m, met by a tip
     bulk: np.ndarray  # [TRUNK] m, kept from the other trunk: arms are held before it
     hull: np.ndarray  # [L, 3] circles that hold the body from the beginning to the end

@@ -30,15 +30,15 @@ def way_of(first, last, frame, moves, stride):
 @kernel
 def overlaps(body, row, other, frame, bulk):
     """Whether the trunk spheres of two rows overlap; those of ``other`` are in a frame."""
-    for b in range(TRUNK):
-        x, z = carried(frame, body[other, b, 0], body[other, b, 2])
-        y = body[other, b, 1]
+    found = False
+    for b in range(TRUNK):  # without branches: all at once
+        x, z = carried(frame, body[other, 0, b], body[other, 2, b])
+        y = body[other, 1, b]
         for a in range(TRUNK):
-            dx, dy, dz = body[row, a, 0] - x, body[row, a, 1] - y, body[row, a, 2] - z
+            dx, dy, dz = body[row, 0, a] - x, body[row, 1, a] - y, body[row, 2, a] - z
             r = bulk[a] + bulk[b]
-            if dx * dx + dy * dy + dz * dz < r * r:
-                return True
-    return False
+            found |= dx * dx + dy * dy + dz * dz < r * r
+    return found
 
 
 @kernel
