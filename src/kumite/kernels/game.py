@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kumite.kernels.jit import kernel
+from kumite.kernels.jit import kernel, lean_kernel
 from kumite.kernels.moves import (
     ATTACK,
     BEGUN,
@@ -41,7 +41,7 @@ from kumite.kernels.moves import (
     touch,
 )
 from kumite.kernels.policy import wrapped
-from kumite.kernels.prune import judge, way_of, worst_allowed
+from kumite.kernels.prune import fewest, judge, way_of, worst_allowed
 from kumite.kernels.style import (
     DISTANCE,
     FACING,
@@ -58,7 +58,7 @@ from kumite.kernels.style import (
 )
 
 
-@kernel
+@lean_kernel
 def meets(k, begun, landed, other, other_begun, frame, since, until, moves, rules):
     """The first tip of stretch k, of a blow after ``landed``, that meets the body of ``other``
     after ``since``, no later than ``until``; both begun then. frame: k's, seen from the other's.
@@ -114,7 +114,7 @@ def meets(k, begun, landed, other, other_begun, frame, since, until, moves, rule
     return NOTHING, NOTHING
 
 
-@kernel
+@lean_kernel
 def contact(state, p, since, until, moves, rules):
     """The first tip of player p that meets the opponent after ``since``, no later than ``until``:
     :func:`meets`."""
@@ -125,7 +125,7 @@ def contact(state, p, since, until, moves, rules):
     return meets(k, begun, landed, other, other_begun, frame, since, until, moves, rules)
 
 
-@kernel
+@lean_kernel
 def land(state, p, n, part, when, x, z, yaw, moves, rules, want):
     """Tip n of player p meets a part: damage D (Eq. 6), and what its reaction is asked for.
 
@@ -143,7 +143,7 @@ def land(state, p, n, part, when, x, z, yaw, moves, rules, want):
     return damage, want.asked[1 - p, response] * want.weights[1 - p, REQUIREMENT]
 
 
-@kernel
+@lean_kernel
 def caught(state, chosen, since, until, moves, rules):
     """Whether the two are within the distance of a catch after ``since``, no later than ``until``.
 
@@ -161,7 +161,7 @@ def caught(state, chosen, since, until, moves, rules):
     return False
 
 
-@kernel
+@lean_kernel
 def play_on(state, before, chosen, until, moves, rules, want):
     """What happens after ``chosen`` until someone chooses, and on to ``until`` or both have ended.
 
@@ -216,7 +216,7 @@ def play_on(state, before, chosen, until, moves, rules, want):
                 score1, dealt1 = score1 + worth, dealt1 + damage
 
 
-@kernel
+@lean_kernel
 def closeness(weights, p, u, w, yaw):
     """f^mov1 of player p (Eq. 4) who looks along ``yaw``, the opponent (u, w) away; a cost."""
     off = wrapped(np.arctan2(u, w) - yaw - weights[p, PREFERRED_FACING])
@@ -224,7 +224,7 @@ def closeness(weights, p, u, w, yaw):
     return -weights[p, FACING] * off * off - weights[p, DISTANCE] * far * far
 
 
-@kernel
+@lean_kernel
 def movement(state, p, moves, want):
     """f^mov1 of player p at the end of its action (Eq. 4), and f^mov2 (Eq. 9); both are costs."""
     weights = want.weights
@@ -240,7 +240,7 @@ def movement(state, p, moves, want):
     return closeness(weights, p, u - x, w - z, yaw), coop
 
 
-@kernel
+@lean_kernel
 def edge(state, before, p, moves, rules, want):
     """What it adds in ``state`` that player p has begun a stretch: comp, coop as p sees them.
 
@@ -257,9 +257,9 @@ def edge(state, before, p, moves, rules, want):
     return comp + given - want.weights[p, TAKEN] * taken, coop + there
 
 
-@kernel
-def expand(game, state, children):
-    """All that whoever is next can do and should consider: see :mod:`kumite.kernels.search`."""
+@lean_kernel
+def choices(game, state, children, before, way, flaws):
+    """:func:`expand`; before [STATE], way [m, 5] and flaws [M]: room."""
     moves, rules, want = parts(game)
     p = next_player(state)
     o, q = p * FIELDS, 1 - p
@@ -276,8 +276,8 @@ def expand(game, state, children):
     attacked = moves.kind[opposing] == ATTACK and begun + moves.last_tip[opposing] >= time
     landed = state[q * FIELDS + LANDED]
     back = inverse(frame)
-    way = way_of(first, last, frame, moves, rules.stride)
-    flaws = np.empty(stretches.shape[0], dtype=np.int64)
+    stands = way_of(first, last, frame, moves, rules.stride, way)
+    flaws = flaws[: stretches.shape[0]]
     for hasty in (True, False):
         judge(
             stretches,
@@ -285,6 +285,7 @@ def expand(game, state, children):
             last,
             frame,
             way,
+            stands,
             attacked,
             rules.facing[p],
             hasty,
@@ -292,12 +293,11 @@ def expand(game, state, children):
             rules,
             flaws,
         )
-        if flaws.min() == 0:  # whatever has a flaw goes, and it makes no difference which
+        if fewest(flaws) == 0:  # whatever has a flaw goes, and it makes no difference which
             break
     limit = worst_allowed(flaws)
     action, comps, coops, states = children.action, children.comp, children.coop, children.state
     weights, sign = want.weights, 1.0 if p == 0 else -1.0
-    before = np.empty(STATE)
     coop_too = weights[p, PLACE] != 0.0 or weights[p, HEADING] != 0.0
     count = 0
     for n in range(stretches.shape[0]):
@@ -334,10 +334,18 @@ def expand(game, state, children):
 
 
 @kernel
-def leaves(game, children, count):
-    """What is begun is played to its end, with nobody choosing anything more."""
+def expand(game, state, children):
+    """All that whoever is next can do and should consider: see :mod:`kumite.kernels.search`."""
+    q = 1 - next_player(state)
+    looked = game.duration[int(state[q * FIELDS + STRETCH])] // game.stride + 2
+    flaws = np.empty(children.action.shape[0], dtype=np.int64)
+    return choices(game, state, children, np.empty(STATE), np.empty((looked, 5)), flaws)
+
+
+@lean_kernel
+def play_out(game, children, count, before):
+    """:func:`leaves`; before [STATE]: room."""
     moves, rules, want = parts(game)
-    before = np.empty(STATE)
     for n in range(count):
         if children.state[n, QUIET] != 0.0:
             continue
@@ -347,3 +355,9 @@ def leaves(game, children, count):
         if dealt0 > 0.0 or dealt1 > 0.0:
             children.comp[n] += score0 - want.weights[0, TAKEN] * dealt1
         children.coop[n] += coop
+
+
+@kernel
+def leaves(game, children, count):
+    """What is begun is played to its end, with nobody choosing anything more."""
+    play_out(game, children, count, np.empty(STATE))

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kumite.kernels.jit import kernel
+from kumite.kernels.jit import lean_kernel
 
 # The state of one player; a state is that of both, one after the other.
 STRETCH, BEGUN, END, X, Z, YAW, LANDED, FIELDS = range(8)
@@ -86,7 +86,7 @@ _FIELDS = {n: t for part in (Moves, Rules, Want) for n, t in part.__annotations_
 Game = NamedTuple("Game", list(_FIELDS.items()))  # type: ignore[misc]  # flat, for the search
 
 
-@kernel
+@lean_kernel
 def parts(game):
     """The Moves, Rules and Want of a game."""
     return (
@@ -131,14 +131,14 @@ def parts(game):
     )
 
 
-@kernel
+@lean_kernel
 def compose(x, z, yaw, u, w, turn):
     """Planar frame (u, w, turn) of frame (x, z, yaw), in the scene."""
     c, s = np.cos(yaw), np.sin(yaw)
     return x + c * u + s * w, z - s * u + c * w, yaw + turn
 
 
-@kernel
+@lean_kernel
 def place_at(state, p, time, moves):
     """The facing frame of player p at a time; after its action has ended it stands."""
     o = p * FIELDS
@@ -155,7 +155,7 @@ def place_at(state, p, time, moves):
     )
 
 
-@kernel
+@lean_kernel
 def begin(state, p, k, time, x, z, yaw, moves):
     """Player p begins stretch k at a time and place."""
     o = p * FIELDS
@@ -164,13 +164,13 @@ def begin(state, p, k, time, x, z, yaw, moves):
     state[o + LANDED] = NOTHING
 
 
-@kernel
+@lean_kernel
 def next_player(state):
     """Who ends first; of equals the searcher."""
     return 0 if state[END] <= state[FIELDS + END] else 1
 
 
-@kernel
+@lean_kernel
 def seen_from(state, q, x, z, yaw):
     """The frame in which player q's stretch begins, seen from (x, z, yaw): x, z, cosine, sine."""
     o = q * FIELDS
@@ -180,21 +180,21 @@ def seen_from(state, q, x, z, yaw):
     return c * u - s * w, s * u + c * w, np.cos(turn), np.sin(turn)
 
 
-@kernel
+@lean_kernel
 def carried(frame, x, z):
     """A point of a frame (:func:`seen_from`) seen from without."""
     u, w, c, s = frame
     return u + c * x + s * z, w - s * x + c * z
 
 
-@kernel
+@lean_kernel
 def inverse(frame):
     """The frame from which a frame is seen, seen from there."""
     u, w, c, s = frame
     return s * w - c * u, -s * u - c * w, c, -s
 
 
-@kernel
+@lean_kernel
 def touch(x, z, radius, circles, n, gap):
     """Whether a circle and the n-th of circles come within ``gap`` [m] of each other."""
     dx, dz, r = circles[n, 0] - x, circles[n, 1] - z, circles[n, 2] + radius + gap

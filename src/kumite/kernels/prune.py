@@ -7,27 +7,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from kumite.kernels.jit import kernel
+from kumite.kernels.jit import lean_kernel
 from kumite.kernels.moves import ATTACK, DEFENCE, TRUNK, carried, touch
 
 ILLOGICAL, TOO_FAR, TURNED_AWAY, OVERLAPS, ENDS_INSIDE = 1, 2, 4, 8, 16
 """What is wrong with an action, the least important first."""
 
 
-@kernel
-def way_of(first, last, frame, moves, stride):
-    """Where the opponent is every ``stride`` frames [m, 5]: its facing frame's x and z, and its
-    trunk's circle. After ``last`` frames from row ``first`` it stands, as in the last row here."""
-    way = np.empty((last // stride + 2, 5))
-    for j in range(way.shape[0]):
+@lean_kernel
+def way_of(first, last, frame, moves, stride, way):
+    """Where the opponent is every ``stride`` frames: its facing frame's x and z, and its trunk's
+    circle, into way [m, 5]. After ``last`` frames from row ``first`` it stands; the row of way in
+    which it does is returned."""
+    stands = last // stride + 1
+    for j in range(stands + 1):
         row = first + min(j * stride, last)
         way[j, 0], way[j, 1] = carried(frame, moves.track[row, 0], moves.track[row, 1])
         way[j, 2], way[j, 3] = carried(frame, moves.trunk[row, 0], moves.trunk[row, 1])
         way[j, 4] = moves.trunk[row, 2]
-    return way
+    return stands
 
 
-@kernel
+@lean_kernel
 def overlaps(body, row, other, frame, bulk):
     """Whether the trunk spheres of two rows overlap; those of ``other`` are in a frame."""
     found = False
@@ -41,18 +42,18 @@ def overlaps(body, row, other, frame, bulk):
     return found
 
 
-@kernel
-def judge(stretches, first, last, frame, way, attacked, facing, hasty, moves, rules, flaws):
+@lean_kernel
+def judge(stretches, first, last, frame, way, stands, attacked, facing, hasty, moves, rules, flaws):
     """What is wrong with each of stretches [n], into flaws [n]; if ``hasty`` the first thing found.
 
-    first, last, frame, way: the opponent's rows seen from here (:func:`way_of`). Ranges are those
+    first, last, frame, way, stands: the opponent's rows seen from here (:func:`way_of`). Ranges are those
     of the nearest the two get, where the stretch is begun or later. facing [rad]: how far from the
     opponent it may end.
     """
     body, track, trunk, start, bulk = moves.body, moves.track, moves.trunk, moves.start, moves.bulk
     duration, kind, heading, stride = moves.duration, moves.kind, moves.heading, rules.stride
     attack2, defence2 = rules.attack_range**2, rules.defence_range**2
-    cone, stands = np.cos(facing), way.shape[0] - 1
+    cone = np.cos(facing)
     for n in range(stretches.shape[0]):
         k = stretches[n]
         row, other = start[k] + duration[k], first + min(duration[k], last)
@@ -94,17 +95,26 @@ def judge(stretches, first, last, frame, way, attacked, facing, hasty, moves, ru
         flaws[n] = flaw
 
 
-@kernel
+@lean_kernel
+def fewest(flaws):
+    """The least of flaws [n]."""
+    least = flaws[0]
+    for n in range(1, flaws.shape[0]):
+        least = min(least, flaws[n])
+    return least
+
+
+@lean_kernel
 def worst_allowed(flaws):
     """The flaws that must be put up with: those of no action but the least important (section V-C).
 
     Actions whose flaws are below the number returned are kept. Where all overlap, OVERLAPS is taken
     from all of them: what counts then is the last frame, and the other flaws as ever.
     """
-    if flaws.min() >= OVERLAPS:
+    if fewest(flaws) >= OVERLAPS:
         for n in range(flaws.shape[0]):
             flaws[n] -= OVERLAPS
-    least = flaws.min()
+    least = fewest(flaws)
     limit = 1
     while limit <= least:
         limit *= 2

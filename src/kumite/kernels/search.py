@@ -35,7 +35,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import get_num_threads
 
-from kumite.kernels.jit import kernel, plugged
+from kumite.kernels.jit import kernel, lean_kernel, plugged
 
 SEARCHER, OPPONENT = 0, 1  # who chooses: a max node, a min node
 NO_CHILD = -1
@@ -105,7 +105,7 @@ def part(children, first, stop):
     )
 
 
-@kernel
+@lean_kernel
 def copy_row(source, n, target, m):
     """Row n of one becomes row m of the other."""
     target.action[m] = source.action[n]
@@ -114,7 +114,7 @@ def copy_row(source, n, target, m):
         target.state[m, s] = source.state[n, s]
 
 
-@kernel
+@lean_kernel
 def add_path(nodes, n, first, count):
     """Eq. 1: what the edges to node n's children add becomes the sum along the path."""
     comp, coop = nodes.comp, nodes.coop
@@ -123,7 +123,7 @@ def add_path(nodes, n, first, count):
         coop[c] += coop[n]
 
 
-@kernel
+@lean_kernel
 def preferred(nodes, first, count, player):
     """Eq. 3: the row that ``player`` chooses, the first of equals."""
     comp, coop = nodes.comp, nodes.coop
@@ -136,14 +136,14 @@ def preferred(nodes, first, count, player):
     return best
 
 
-@kernel
+@lean_kernel
 def copy_up(nodes, n, first, count, player):
     """Eq. 2: node n has the scores of the child that ``player`` chooses."""
     best = preferred(nodes, first, count, player)
     nodes.comp[n], nodes.coop[n] = nodes.comp[best], nodes.coop[best]
 
 
-@kernel
+@lean_kernel
 def narrow(levels, d, comp):
     """A child at level d is worth ``comp``: True where the rest of them make no difference.
 
