@@ -144,6 +144,8 @@ class GameTree:
                 f"({', '.join(sorted(set(self.kinds)))}) or labels of the library"
             )
         out = np.zeros(len(self.kinds))
+        if not player.wanted and not player.unwanted:
+            return out
         for k, names in enumerate(zip(self.kinds, self.labels)):
             out[k] = any(n in player.wanted for n in names) - any(
                 n in player.unwanted for n in names
@@ -377,4 +379,3 @@ def _circles(points: np.ndarray, rim: np.ndarray, first: np.ndarray) -> np.ndarr
     off = np.linalg.norm(points - np.repeat(middle, count, axis=0)[:, None], axis=-1) + rim
     radius = np.maximum.reduceat(off.max(axis=1), first) + SLACK
     return np.column_stack([middle, radius])
-

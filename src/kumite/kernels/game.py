@@ -28,15 +28,15 @@ from kumite.kernels.moves import (
     STAGGER,
     STATE,
     STRETCH,
-    X,
     YAW,
+    X,
     Z,
     begin,
     carried,
+    inverse,
     next_player,
     parts,
     place_at,
-    inverse,
     seen_from,
     touch,
 )
@@ -317,7 +317,8 @@ def choices(game, state, children, before, way, flaws):
             if met != NOTHING:
                 hit = begun + moves.tip_when[met]
         states[count, QUIET] = 1.0 if hit == np.inf else 0.0
-        if hit > min(state[q * FIELDS + END], time + moves.duration[k]) and rules.catch == 0.0 and not coop_too:
+        chosen = min(state[q * FIELDS + END], time + moves.duration[k])
+        if hit > chosen and rules.catch == 0.0 and not coop_too:
             row, other = moves.start[k] + moves.duration[k], first + min(moves.duration[k], last)
             u, w = carried(frame, moves.track[other, 0], moves.track[other, 1])
             u, w = u - moves.track[row, 0], w - moves.track[row, 1]
@@ -351,7 +352,9 @@ def play_out(game, children, count, before):
             continue
         state = children.state[n]
         since = min(state[END], state[FIELDS + END])
-        score0, _, dealt0, dealt1, coop, _ = play_on(state, before, since, np.inf, moves, rules, want)
+        score0, _, dealt0, dealt1, coop, _ = play_on(
+            state, before, since, np.inf, moves, rules, want
+        )
         if dealt0 > 0.0 or dealt1 > 0.0:
             children.comp[n] += score0 - want.weights[0, TAKEN] * dealt1
         children.coop[n] += coop

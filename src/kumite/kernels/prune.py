@@ -46,9 +46,9 @@ def overlaps(body, row, other, frame, bulk):
 def judge(stretches, first, last, frame, way, stands, attacked, facing, hasty, moves, rules, flaws):
     """What is wrong with each of stretches [n], into flaws [n]; if ``hasty`` the first thing found.
 
-    first, last, frame, way, stands: the opponent's rows seen from here (:func:`way_of`). Ranges are those
-    of the nearest the two get, where the stretch is begun or later. facing [rad]: how far from the
-    opponent it may end.
+    first, last, frame, way, stands: the opponent's rows seen from here (:func:`way_of`). Ranges
+    are those of the nearest the two get, where the stretch is begun or later. facing [rad]: how far
+    from the opponent it may end.
     """
     body, track, trunk, start, bulk = moves.body, moves.track, moves.trunk, moves.start, moves.bulk
     duration, kind, heading, stride = moves.duration, moves.kind, moves.heading, rules.stride

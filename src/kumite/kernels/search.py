@@ -6,7 +6,8 @@ chooses. Edges add to two scores along the path, S_comp and S_coop (Eq. 1); both
 the child that whoever chooses prefers (Eqs. 2, 3). Depth is the number of levels below the root,
 whoever chooses at each.
 
-A game is any NamedTuple of arrays and numbers, handed on untouched, and two functions of a module, compiled with ``@kernel``:
+A game is any NamedTuple of arrays and numbers, handed on untouched, and two functions of a module,
+compiled with ``@kernel``:
 
 ``expand(game, state, children) -> (count, considered, player)``
     fills the first ``count`` rows of ``children`` with what can be done in ``state`` [S]: at most
@@ -377,7 +378,9 @@ def make_search(expand: Callable[..., Any], leaves: Callable[..., Any] = no_more
 
         def turn(w: int) -> None:
             first = start + w
-            dig(game, nodes, first, stop, workers, left, most, player, prune, made[w], considered[w])
+            dig(
+                game, nodes, first, stop, workers, left, most, player, prune, made[w], considered[w]
+            )
 
         if workers > 1 and cores > 1:
             list(threads(cores).map(turn, range(workers)))
