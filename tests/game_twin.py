@@ -13,8 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from kumite.control.styles import Style
-from kumite.kernels import game as kernels
-from kumite.kernels.game import ATTACK, DEFENCE, HEAD, NOTHING, SIZES, TRUNK
+from kumite.kernels import moves as kernels
+from kumite.kernels.moves import ATTACK, DEFENCE, HEAD, NOTHING, SIZES, TRUNK
+from kumite.kernels.style import PLACE
 from kumite.rotation import planar_apply, planar_compose, wrap_angle
 from tests.reference import Edge
 
@@ -97,17 +98,15 @@ class Toy:
     def game(self) -> kernels.Game:
         moves = self.moves
         tips = [tip for move in moves for tip in move.tips]
-        spread = [
-            np.linalg.norm(m.body[:, :TRUNK, ::2] - m.track[:, None, :2], axis=-1).max()
-            for m in moves
-        ]
+        hull, trunk, ring, reach = zip(*(self.bounds(m) for m in moves))
+        end = np.array([m.track[-1, 2] for m in moves])
         weights = np.stack([side.style.as_array() for side in self.sides])
         asked, goal = np.zeros((2, len(moves))), np.zeros((2, 1, 2))
         for p, side in enumerate(self.sides):
             for move, sign in side.asked.items():
                 asked[p, move] = sign
             if side.goal is None:
-                weights[p, kernels.PLACE] = 0.0
+                weights[p, PLACE] = 0.0
             else:
                 goal[p] = side.goal
         tired = np.zeros(len(moves))
@@ -124,17 +123,22 @@ class Toy:
             np.array([m.short for m in moves]),
             np.concatenate([[0], np.cumsum([m.duration + 1 for m in moves])]).astype(np.int64),
             np.concatenate([m.track for m in moves]).astype(float),
-            np.array(spread, float),
-            np.concatenate([m.body for m in moves]),
+            np.stack([np.sin(end), np.cos(end)], axis=1),
+            np.concatenate(trunk),
+            np.concatenate([m.body for m in moves]).swapaxes(1, 2).copy(),
             self.radius,
             self.radius[:4],
+            np.array(hull, float),
+            np.concatenate(ring),
             np.concatenate([[0], np.cumsum([len(m.tips) for m in moves])]).astype(np.int64),
             np.array([tip.when for tip in tips], np.int64),
             np.array([tip.at for tip in tips], float).reshape(-1, 3),
             np.array([tip.before for tip in tips], float).reshape(-1, 3),
+            np.array([math.dist(tip.at, tip.before) + 1e-6 for tip in tips], float),
             np.array([tip.speed for tip in tips], float),
             np.array([tip.blow for tip in tips], np.int64),
             np.array(last, np.int64),
+            np.array(reach, float),
             self.stride,
             np.full(2, self.facing),
             self.attack_range,
@@ -152,6 +156,21 @@ class Toy:
             1.0,
             np.array(self.response, np.int64),
             tired,
+        )
+
+    def bounds(self, move: Move):
+        """Circles about the body and, row by row, the trunk and the body; one about the tips."""
+        ground = move.body[..., ::2].astype(float)
+        far = np.linalg.norm(ground, axis=-1) + self.radius
+        off = np.linalg.norm(ground - move.track[:, None, :2], axis=-1) + self.radius
+        wide = off[:, :TRUNK].max(axis=1)
+        trunk = np.column_stack([move.track[:, :2], wide + 1e-6])
+        tips = [math.hypot(at[0], at[2]) for tip in move.tips for at in (tip.at, tip.before)]
+        return (
+            (0, 0, far.max() + 1e-6),
+            trunk,
+            np.column_stack([move.track[:, :2], off.max(axis=1) + 1e-6]),
+            (0, 0, max(tips, default=0.0) + 1e-6),
         )
 
     @property
@@ -336,7 +355,7 @@ def entering(a, b, centre, radius: float) -> float | None:
 
 
 def as_state(now: Moment) -> np.ndarray:
-    out = np.empty(kernels.STATE)
+    out = np.zeros(kernels.STATE)
     for p, f in enumerate(now.fighters):
         out[p * kernels.FIELDS : (p + 1) * kernels.FIELDS] = [
             f.move,

@@ -14,7 +14,7 @@ from kumite.control.game_tree import GameTree
 from kumite.errors import KumiteError
 from kumite.graph import Library, builtin_library
 from kumite.kernels.blow import NO_BLOW
-from kumite.kernels.game import FIELDS, place_at
+from kumite.kernels.moves import FIELDS, place_at
 from kumite.scene import BoutScene, SceneSettings, load_scene, measure, record
 from kumite.scene.apart import held_apart, pairs, push_apart
 from kumite.scene.floor import PUSH_SPEED
@@ -172,7 +172,7 @@ def test_who_is_struck_again_is_pushed_from_where_it_is(actions: Library, physic
 
 
 def test_a_physical_fight_is_the_same_every_time(actions: Library, physics: None):
-    a, b = (record(_fight(actions, "physical"), 8.0) for _ in range(2))
+    a, b = (record(_fight(actions, "physical"), 15.0) for _ in range(2))
     assert any(e.data.get("physical") for e in a.events)
     assert a.wxyz.tobytes() == b.wxyz.tobytes() and a.events == b.events
     assert a.root_position.tobytes() == b.root_position.tobytes()

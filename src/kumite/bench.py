@@ -352,6 +352,94 @@ def _jump(folder: Path) -> float:
     return max(c.join_jump_m_s for m in _fights(folder) for c in m.characters)
 
 
+PLACES = 6  # of a fight, at which its game tree is searched
+FIGHT_SECONDS = 8.0
+
+
+@cache
+def _places(folder: Path):
+    """The game of a fight of the folder's actions, and (game, state, players, recent) at moments at
+    which someone chooses."""
+    from kumite.graph import build_action_library
+    from kumite.scene import BoutScene, load_scene, record
+
+    scene = BoutScene(load_scene("boxing"), build_action_library(_clips(folder)), seed=1)
+    tree, decide, found = scene.tree, scene.tree.decide, []
+
+    def note(state, players, recent):
+        found.append((tree.game(players, recent), state, players, recent))
+        return decide(state, players, recent)
+
+    vars(tree)["decide"] = note
+    record(scene, FIGHT_SECONDS)
+    del vars(tree)["decide"]
+    return tree, found[2 :: max((len(found) - 2) // PLACES, 1)][:PLACES]
+
+
+def _whole_trees(folder: Path, all_cores: bool) -> float:
+    """Nodes/s of whole trees of three levels."""
+    from kumite.control.game_tree import SEARCH
+
+    tree, places = _places(folder)
+    search = SEARCH.parallel if all_cores else SEARCH.serial
+
+    def nodes() -> int:
+        return sum(int(search(g, s, 3, tree.most, False).nodes.sum()) for g, s, *_ in places)
+
+    return nodes() / _best(nodes)
+
+
+@_figure("game tree: nodes on one core", "nodes/s", 1e6)
+def _nodes(folder: Path) -> float:
+    return _whole_trees(folder, False)
+
+
+@_figure("game tree: nodes on all cores", "nodes/s", 1.8e6)
+def _nodes_on_all_cores(folder: Path) -> float:
+    return _whole_trees(folder, True)
+
+
+@_figure("game tree: nodes on all cores over those on one", "times")
+def _more_on_all_cores(folder: Path) -> float:
+    return _whole_trees(folder, True) / _whole_trees(folder, False)
+
+
+def _deciding(folder: Path, depth: int) -> float:
+    """Seconds that a decision takes, mean."""
+    from dataclasses import replace
+
+    tree, places = _places(folder)
+    sides = [((replace(p[0], depth=depth), p[1]), state, recent) for _, state, p, recent in places]
+    return _best(lambda: [tree.decide(s, p, recent) for p, s, recent in sides]) / len(sides)
+
+
+@_figure("game tree: a decision 1 level deep", "s")
+def _decision_1(folder: Path) -> float:
+    return _deciding(folder, 1)
+
+
+@_figure("game tree: a decision 2 levels deep", "s")
+def _decision_2(folder: Path) -> float:
+    return _deciding(folder, 2)
+
+
+@_figure("game tree: a decision 3 levels deep", "s", 0.03)
+def _decision_3(folder: Path) -> float:
+    return _deciding(folder, 3)
+
+
+@_figure("game tree: a decision 4 levels deep", "s", 1.0)
+def _decision_4(folder: Path) -> float:
+    return _deciding(folder, 4)
+
+
+@_figure("game tree: nodes looked at for a decision 3 levels deep, mean", "nodes")
+def _looked_at(folder: Path) -> float:
+    tree, places = _places(folder)
+    found = [tree.decide(state, players, recent) for _, state, players, recent in places]
+    return float(np.mean([d.nodes.sum() for d in found]))
+
+
 @_figure("kumite build from nothing compiled", "s", 90.0)
 def _cold(folder: Path) -> float:
     with tempfile.TemporaryDirectory() as scratch:

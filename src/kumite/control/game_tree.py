@@ -19,9 +19,10 @@ from kumite.control.combination import build_table
 from kumite.control.styles import STYLES, VULNERABILITY, Style, short_range
 from kumite.errors import KumiteError
 from kumite.graph import Library
-from kumite.kernels import game as kernels
+from kumite.kernels import game as fight
+from kumite.kernels import moves as kernels
 from kumite.kernels.blow import NO_BLOW
-from kumite.kernels.game import FALL, FLINCH, NOTHING, SIZES, STAGGER
+from kumite.kernels.moves import FALL, FLINCH, NOTHING, SIZES, STAGGER
 from kumite.kernels.search import make_search
 from kumite.kernels.style import HEADING, PLACE, REQUIREMENT
 from kumite.rotation import planar_apply, planar_compose, planar_inverse, rotate
@@ -32,6 +33,7 @@ TRUNK = ("head", "chest", "waist", "pelvis")
 ARMS = ("left_forearm", "left_hand", "right_forearm", "right_hand")
 BULK = 0.08  # m by which a trunk is thicker for the other body: arms are held before it
 STOUTER = 1.1  # the spheres of a part are that much thicker than its capsule: they stand for all
+SLACK = 1e-6  # m by which bounds are wider than what they hold: no rounding makes a difference
 DEEPEST = 6  # levels; a seventh would take hours
 BOREDOM = 1e5  # score that an action loses for each recent use: a blow of 1 m/s
 RESTLESSNESS = 15.0  # score that an action loses for each recent one of its kind
@@ -101,7 +103,7 @@ class Decision:
         return 1.0 - float(self.nodes[1:].sum()) / max(float(self.considered[1:].sum()), 1.0)
 
 
-SEARCH = make_search(kernels.expand, kernels.leaves)
+SEARCH = make_search(fight.expand, fight.leaves)
 
 
 class GameTree:
@@ -221,7 +223,7 @@ class GameTree:
         facing: the planar frames [3] in which they are now; begun: when their stretches began;
         landed: the blow of the library that each has landed last with what it is doing, or NO_BLOW.
         """
-        out = np.empty(kernels.STATE)
+        out = np.zeros(kernels.STATE)
         for p in range(2):
             k = stretches[p]
             i = int(np.clip(now - begun[p], 0, self.moves.duration[k]))
@@ -268,7 +270,7 @@ class GameTree:
             goal[p, : len(goals[p])] = goals[p]
             goal[p, len(goals[p]) :] = goals[p][-1]
             if player.goal is None:
-                weights[p, kernels.PLACE] = 0.0
+                weights[p, PLACE] = 0.0
             if not asked[p].any():
                 weights[p, REQUIREMENT] = 0.0
         return kernels.Game(
@@ -355,10 +357,13 @@ def _moves(library: Library) -> kernels.Moves:
     spheres = np.stack(middle, axis=1)  # [R, B, 3]
     parts = [body.part(p) for p in (*TRUNK, *ARMS)]
     radius = STOUTER * np.maximum(body.radius_start[parts], body.radius_end[parts])
-    off = np.hypot(
-        spheres[:, : len(TRUNK), 0] - track[:, None, 0],
-        spheres[:, : len(TRUNK), 2] - track[:, None, 1],
-    ).max(axis=1)
+    bulk = radius[: len(TRUNK)] + BULK
+    places = spheres.astype(np.float32)  # what the kernels have
+    ground = places[..., [0, 2]].astype(float)
+    trunk = _circles(ground[:, : len(TRUNK)], bulk, np.arange(len(track)))
+    hull = _circles(ground, radius, start[:-1])
+    ring = _circles(ground, radius, np.arange(len(track)))
+    end = track[start[1:] - 1, 2]
     windows = blow_windows(library)
     row, limb = np.nonzero((windows[frame] != NO_BLOW) & (local > 0)[:, None])
     tips = np.moveaxis(library.strikes.tip, 1, 0)  # [4, F, 3] in each frame's facing frame
@@ -367,7 +372,11 @@ def _moves(library: Library) -> kernels.Moves:
         return planar_apply(planar_compose(home[row], facing[f]), tips[limb, f])
 
     now, before = placed(frame[row]), placed(frame[row] - 1)
-    speed = np.linalg.norm(now - before, axis=1) * clips.fps
+    reach = np.zeros((len(duration), 3))
+    striking, first = np.unique(owner[row], return_index=True)
+    ways = np.stack([now, before], axis=1)[..., [0, 2]]
+    reach[striking] = _circles(ways, np.zeros(2), first)
+    way = np.linalg.norm(now - before, axis=1)
     last_tip = np.full(len(duration), NOTHING)
     np.maximum.at(last_tip, owner[row], local[row])
     actions, action = library.actions, library.action_of_stretch
@@ -385,15 +394,32 @@ def _moves(library: Library) -> kernels.Moves:
         short_range(actions)[action],
         start,
         np.ascontiguousarray(track),
-        np.maximum.reduceat(off, start[:-1]),
-        spheres.astype(np.float32),
+        np.stack([np.sin(end), np.cos(end)], axis=1),
+        trunk,
+        np.ascontiguousarray(places.swapaxes(1, 2)),
         radius,
-        radius[: len(TRUNK)] + BULK,
+        bulk,
+        hull,
+        ring,
         np.searchsorted(owner[row], np.arange(len(duration) + 1)).astype(np.int64),
         local[row].astype(np.int64),
         np.ascontiguousarray(now),
         np.ascontiguousarray(before),
-        speed,
+        way + SLACK,
+        way * clips.fps,
         _ranks(library)[windows[frame[row], limb]],
         last_tip.astype(np.int64),
+        reach,
     )
+
+
+def _circles(points: np.ndarray, rim: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Circles [G, 3] on the ground that hold discs [R, n, 2] with radii ``rim`` [n]; the rows of
+    the g-th begin with ``first[g]``."""
+    low = np.minimum.reduceat((points - rim[:, None]).min(axis=1), first)
+    high = np.maximum.reduceat((points + rim[:, None]).max(axis=1), first)
+    middle = 0.5 * (low + high)
+    count = np.diff(np.append(first, len(points)))
+    off = np.linalg.norm(points - np.repeat(middle, count, axis=0)[:, None], axis=-1) + rim
+    radius = np.maximum.reduceat(off.max(axis=1), first) + SLACK
+    return np.column_stack([middle, radius])

@@ -43,6 +43,12 @@ def _kept_while_all_sources_are(decorate: Callable[..., Any]) -> Callable[..., A
 kernel = _kept_while_all_sources_are(
     njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 )
+# Numba counts who uses an array whenever a tuple of arrays is looked into, one count for all cores:
+# most of the time of small kernels that are handed large tuples. These count nothing, so they must
+# neither make arrays nor return any to a kernel that counts. (Not a public option.)
+lean_kernel = _kept_while_all_sources_are(
+    njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, _nrt=False)  # type: ignore[call-overload]
+)
 parallel_kernel = _kept_while_all_sources_are(
     njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, parallel=True)
 )

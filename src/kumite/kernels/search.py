@@ -6,8 +6,8 @@ chooses. Edges add to two scores along the path, S_comp and S_coop (Eq. 1); both
 the child that whoever chooses prefers (Eqs. 2, 3). Depth is the number of levels below the root,
 whoever chooses at each.
 
-A game is any NamedTuple of arrays and numbers (no tuples in it: ``prange`` cannot hand these on),
-handed on untouched, and two functions of a module, compiled with ``@kernel``:
+A game is any NamedTuple of arrays and numbers, handed on untouched, and two functions of a module,
+compiled with ``@kernel``:
 
 ``expand(game, state, children) -> (count, considered, player)``
     fills the first ``count`` rows of ``children`` with what can be done in ``state`` [S]: at most
@@ -29,17 +29,19 @@ Shapes: M children at most, S numbers in a state, D levels.
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import prange
+from numba import get_num_threads
 
-from kumite.kernels.jit import kernel, plugged
+from kumite.kernels.jit import kernel, lean_kernel, plugged
 
 SEARCHER, OPPONENT = 0, 1  # who chooses: a max node, a min node
 NO_CHILD = -1
 TASKS = 64  # subtrees to share out: the tree is split at its first level with as many nodes
-WORKERS = 120  # take turns at them: each has large and small ones. Many core counts divide it
+WORKERS = 24  # take turns at them: each has large and small ones. Many core counts divide it
 
 
 class Children(NamedTuple):
@@ -104,7 +106,7 @@ def part(children, first, stop):
     )
 
 
-@kernel
+@lean_kernel
 def copy_row(source, n, target, m):
     """Row n of one becomes row m of the other."""
     target.action[m] = source.action[n]
@@ -113,7 +115,7 @@ def copy_row(source, n, target, m):
         target.state[m, s] = source.state[n, s]
 
 
-@kernel
+@lean_kernel
 def add_path(nodes, n, first, count):
     """Eq. 1: what the edges to node n's children add becomes the sum along the path."""
     comp, coop = nodes.comp, nodes.coop
@@ -122,7 +124,7 @@ def add_path(nodes, n, first, count):
         coop[c] += coop[n]
 
 
-@kernel
+@lean_kernel
 def preferred(nodes, first, count, player):
     """Eq. 3: the row that ``player`` chooses, the first of equals."""
     comp, coop = nodes.comp, nodes.coop
@@ -135,14 +137,14 @@ def preferred(nodes, first, count, player):
     return best
 
 
-@kernel
+@lean_kernel
 def copy_up(nodes, n, first, count, player):
     """Eq. 2: node n has the scores of the child that ``player`` chooses."""
     best = preferred(nodes, first, count, player)
     nodes.comp[n], nodes.coop[n] = nodes.comp[best], nodes.coop[best]
 
 
-@kernel
+@lean_kernel
 def narrow(levels, d, comp):
     """A child at level d is worth ``comp``: True where the rest of them make no difference.
 
@@ -156,10 +158,23 @@ def narrow(levels, d, comp):
 
 
 @kernel
+def ascending(scores):
+    """The order in which a few scores ascend; equals stay as they are."""
+    order = np.arange(scores.shape[0])
+    for c in range(1, scores.shape[0]):
+        n, at = order[c], c
+        while at > 0 and scores[order[at - 1]] > scores[n]:
+            order[at] = order[at - 1]
+            at -= 1
+        order[at] = n
+    return order
+
+
+@kernel
 def best_first(nodes, first, count, player):
     """Order children so that what ``player`` prefers at once comes first: bounds come sooner."""
     sign = -1.0 if player == SEARCHER else 1.0
-    order = np.argsort(sign * nodes.comp[first : first + count], kind="mergesort")
+    order = ascending(sign * nodes.comp[first : first + count])
     kept = empty_children(count, nodes.state.shape[1])
     for c in range(count):
         copy_row(nodes, first + c, kept, c)
@@ -174,18 +189,17 @@ def descend(game, depth, most, block, levels, prune, nodes, considered):
     considered [depth + 1] are added to, but for the node itself. Where ``prune`` is set all of coop
     is 0, and outside of levels.low[0] and high[0] scores are only bounds.
     """
-    if depth == 0:
-        leaves(game, part(block, 0, 1), 1)
-        return
     at, count, player, low, high = levels
     d, at[0], count[0] = 0, 0, 1
     while True:
         n, below = d * most + at[d], (d + 1) * most
-        children = part(block, below, below + most)
-        kept, before, player[d + 1] = expand(game, block.state[n], children)
-        nodes[d + 1] += kept
-        considered[d + 1] += before
-        add_path(block, n, below, kept)
+        kept = 0
+        if depth > 0:
+            children = part(block, below, below + most)
+            kept, before, player[d + 1] = expand(game, block.state[n], children)
+            nodes[d + 1] += kept
+            considered[d + 1] += before
+            add_path(block, n, below, kept)
         if kept > 0 and d + 1 < depth:
             if prune:  # coop is 0: of equals it makes no difference which comes first
                 best_first(block, below, kept, player[d + 1])
@@ -193,11 +207,10 @@ def descend(game, depth, most, block, levels, prune, nodes, considered):
             at[d], count[d] = 0, kept
             low[d], high[d] = low[d - 1], high[d - 1]
             continue
+        first, last = (below, below + kept) if kept > 0 else (n, n + 1)
+        leaves(game, part(block, first, last), last - first)
         if kept > 0:
-            leaves(game, children, kept)
             copy_up(block, n, below, kept, player[d + 1])
-        else:
-            leaves(game, part(block, n, n + 1), 1)
         at[d] += 1
         while d > 0 and (
             at[d] == count[d] or (prune and narrow(levels, d, block.comp[d * most + at[d] - 1]))
@@ -283,7 +296,7 @@ def expand_top(game, state, depth, most, enough):
 
     The root is expanded always, other nodes only where their children are not the tree's last
     level. Returns a Top, the number of its levels, and the first and stop row of the lowest: what
-    is below these is still to be searched.
+    is below these is still to be searched. What had no children is a leaf, not yet played.
     """
     top = only_root(state, depth, most, enough)
     nodes, child, count, player = top.nodes, top.child, top.count, top.player
@@ -294,8 +307,6 @@ def expand_top(game, state, depth, most, enough):
             child[n] = end
             children = part(nodes, end, end + most)
             count[n], before, player[n] = expand(game, nodes.state[n], children)
-            if count[n] == 0:
-                leaves(game, part(nodes, n, n + 1), 1)
             add_path(nodes, n, end, count[n])
             end += count[n]
             top.considered[level + 1] += before
@@ -304,49 +315,32 @@ def expand_top(game, state, depth, most, enough):
     return top, level, start, stop
 
 
-def work(game, nodes, start, stop, left, most, player, prune, made, considered):
-    """Search ``left`` levels below nodes ``start`` to ``stop``, among which ``player`` chooses.
+def work(game, nodes, start, stop, step, left, most, player, prune, made, considered):
+    """Search ``left`` levels below every ``step``-th of nodes ``start`` to ``stop``, among which
+    ``player`` chooses.
 
-    made, considered [workers, left + 1] are added to. A worker takes every so many nodes, and has
-    its own room.
+    made, considered [left + 1] are added to.
     """
-    workers = made.shape[0]
-    for w in prange(workers):
-        block = empty_children((left + 1) * most, nodes.state.shape[1])
-        levels = empty_levels(left, player)
-        turn = np.arange(start + w, stop, workers)
+    block = empty_children((left + 1) * most, nodes.state.shape[1])
+    levels = empty_levels(left, player)
+    turn = np.arange(start, stop, step)
+    if prune:
+        sign = -1.0 if player == SEARCHER else 1.0
+        turn = turn[ascending(sign * nodes.comp[turn])]
+    for n in turn:
+        copy_row(nodes, n, block, 0)
+        descend(game, left, most, block, levels, prune, made, considered)
+        copy_row(block, 0, nodes, n)
         if prune:
-            sign = -1.0 if player == SEARCHER else 1.0
-            turn = turn[np.argsort(sign * nodes.comp[turn], kind="mergesort")]
-        for n in turn:
-            copy_row(nodes, n, block, 0)
-            descend(game, left, most, block, levels, prune, made[w], considered[w])
-            copy_row(block, 0, nodes, n)
-            if prune:
-                # One as good is found exactly, wherever it stands: the first of equals is chosen.
-                short = np.inf if player == OPPONENT else -np.inf
-                narrow(levels, 0, np.nextafter(block.comp[0], short))
+            # One as good is found exactly, wherever it stands: the first of equals is chosen.
+            short = np.inf if player == OPPONENT else -np.inf
+            narrow(levels, 0, np.nextafter(block.comp[0], short))
 
 
-def search(game, state, depth, most, prune):
-    """Search ``depth`` levels below ``state`` [S], of no more than ``most`` children each: a Found.
-
-    Workers search below the first levels; what they find is put together in the tree's order. So
-    the result does not depend on the number of threads.
-
-    prune: skip what cannot change the choice and its scores. Only for games in which all of coop
-    is 0; children of the root that are not chosen may then have a bound instead of their scores
-    (not better than the best one's for whoever chooses), and the work is done on one core.
-    """
-    # Workers know nothing of each other's bounds; one that starts below the root has them all.
-    enough, workers = (1, 1) if prune else (TASKS, WORKERS)
-    top, level, start, stop = expand_top(game, state, depth, most, enough)
-    workers, left = min(workers, stop - start), depth - level
-    made = np.zeros((workers, left + 1), np.int64)
-    considered = np.zeros((workers, left + 1), np.int64)
-    player = top.player[0]
-    work(game, top.nodes, start, stop, left, most, player, prune, made, considered)
-    return put_together(top, start, level, made, considered)
+@cache
+def threads(count: int) -> ThreadPoolExecutor:
+    """As many threads, kept for the next search. Kernels let go of the interpreter's lock."""
+    return ThreadPoolExecutor(count, thread_name_prefix="search")
 
 
 class Search(NamedTuple):
@@ -358,10 +352,47 @@ class Search(NamedTuple):
 
 def make_search(expand: Callable[..., Any], leaves: Callable[..., Any] = no_more) -> Search:
     """The search of the game that ``expand`` and ``leaves`` play, compiled when first called."""
-    walk = plugged(descend, expand=expand, leaves=leaves)
-    begin = plugged(expand_top, expand=expand, leaves=leaves)
-    serial, parallel = (plugged(work, descend=walk, parallel=p) for p in (False, True))
-    return Search(
-        plugged(search, expand_top=begin, work=serial),
-        plugged(search, expand_top=begin, work=parallel),
-    )
+    begin = plugged(expand_top, expand=expand)
+    dig = plugged(work, descend=plugged(descend, expand=expand, leaves=leaves))
+
+    def search(cores: int, game, state, depth: int, most: int, prune: bool) -> Found:
+        """Search ``depth`` levels below ``state`` [S], of no more than ``most`` children each.
+
+        Workers search below the first levels; what they find is put together in the tree's order.
+        So the result does not depend on the number of threads.
+
+        prune: skip what cannot change the choice and its scores. Only for games in which all of
+        coop is 0; children of the root that are not chosen may then have a bound instead of their
+        scores (not better than the best one's for whoever chooses), and the work is done on one
+        core.
+        """
+        # Workers know nothing of each other's bounds; one that starts below the root has them all.
+        enough, workers = (1, 1) if prune else (TASKS, WORKERS)
+        top, level, start, stop = begin(game, state, depth, most, enough)
+        workers, left = max(min(workers, stop - start), 1), depth - level
+        made = np.zeros((workers, left + 1), np.int64)
+        considered = np.zeros((workers, left + 1), np.int64)
+        player, nodes = top.player[0], top.nodes
+        for n in np.flatnonzero(top.count[:start] == 0).tolist():
+            dig(game, nodes, n, n + 1, 1, 0, most, player, False, made[0], considered[0])
+
+        def turn(w: int) -> None:
+            first = start + w
+            dig(
+                game, nodes, first, stop, workers, left, most, player, prune, made[w], considered[w]
+            )
+
+        if workers > 1 and cores > 1:
+            list(threads(cores).map(turn, range(workers)))
+        else:
+            for w in range(workers):
+                turn(w)
+        return put_together(top, start, level, made, considered)
+
+    def serial(*args) -> Found:
+        return search(1, *args)
+
+    def parallel(*args) -> Found:
+        return search(get_num_threads(), *args)
+
+    return Search(serial, parallel)

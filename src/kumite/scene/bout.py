@@ -18,7 +18,7 @@ from kumite.control.game_tree import GOAL_EVERY, MEMORY, Decision, GameTree, Pla
 from kumite.errors import KumiteError, unknown
 from kumite.graph import Library
 from kumite.kernels.blow import NO_BLOW
-from kumite.kernels.game import FALL, NOTHING
+from kumite.kernels.moves import FALL, NOTHING
 from kumite.scene.apart import push_apart
 from kumite.scene.controls import (
     ORDERS,

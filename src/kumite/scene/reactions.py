@@ -19,7 +19,7 @@ import numpy as np
 from kumite.clip import LIMBS, SIDES, forward_kinematics
 from kumite.control.game_tree import GameTree
 from kumite.errors import KumiteError
-from kumite.kernels.game import FALL, NOTHING
+from kumite.kernels.moves import FALL, NOTHING
 from kumite.scene.floor import Floor, Landing
 from kumite.synthesis import (
     EFFECTIVE_MASS,
