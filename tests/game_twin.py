@@ -81,6 +81,9 @@ class Toy:
     suits: np.ndarray | None = None
     response: list[list[int]] = field(default_factory=lambda: [[NOTHING] * SIZES] * 2)
     tired: dict[int, float] = field(default_factory=dict)
+    third: np.ndarray = field(default_factory=lambda: np.zeros((0, 1, 2)))
+    third_side: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    third_wants: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     stride: int = 3
     facing: float = math.radians(60)
     attack_range: float = 1.0
@@ -154,6 +157,9 @@ class Toy:
             goal,
             0.0,
             1.0,
+            self.third,
+            self.third_side,
+            self.third_wants,
             np.array(self.response, np.int64),
             tired,
         )
@@ -323,6 +329,14 @@ class Toy:
             comp += score[p] - style.taken * dealt[1 - p]  # Eq. 5
             if caught:
                 comp += style.given_short - style.taken
+            for at, after_whom, wants in zip(self.third, self.third_side, self.third_wants):
+                far = math.dist((x, z), at[int(min(max(end + 0.5, 0), len(at) - 1))])
+                if after_whom == 1 - p:
+                    comp += wants[0] * (far - wants[1]) ** 2
+                    comp -= style.distance * (far - style.preferred_distance) ** 2
+                    if far < self.catch:
+                        comp -= style.taken + wants[2]
+                comp -= 1e4 * max(1.0 - far / 0.8, 0.0)
             if self.suits is not None:
                 comp += style.suitability * float(np.float32(self.suits[k, other.move]))  # Eq. 7
             if p == 0:
@@ -471,6 +485,10 @@ def random_toy(seed: int, brawl: bool) -> tuple[Toy, Moment]:
         stride=int(rng.integers(1, 4)),
         catch=float(rng.choice([0.0, 0.7])),
     )
+    others = int(rng.integers(0, 3)) if rng.random() < 0.5 else 0
+    toy.third = rng.normal(0, 1.0, (others, 5, 2))
+    toy.third_side = rng.integers(-1, 2, others)
+    toy.third_wants = rng.uniform(0, 3, (others, 3))
     far = rng.uniform(0.4, 0.9) if brawl else rng.uniform(0.3, 1.6)
     yaw = rng.uniform(-3, 3)
     own = np.array([*rng.normal(size=2), yaw])

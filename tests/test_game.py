@@ -117,6 +117,7 @@ def test_it_makes_no_difference_where_in_the_scene_they_are(seed: int):
     toy, now = random_toy(seed, seed % 2 == 0)
     for side in toy.sides:
         side.goal, side.style = None, side.style.changed(heading=0.0)
+    toy.third = toy.third[:0]
     here, there = expanded(toy, now), expanded(toy, turned(now, toy, (3.0, -7.0, 2.5)))
     assert [c.action for c in here] == [c.action for c in there]
     assert [c.comp for c in here] == pytest.approx([c.comp for c in there], abs=1e-8)

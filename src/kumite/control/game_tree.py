@@ -86,6 +86,18 @@ class Player:
 
 
 @dataclass(frozen=True)
+class Others:
+    """Third characters whom two players meet (E of them)."""
+
+    track: np.ndarray  # [E, G, 2] m, where they will be now and every GOAL_EVERY s
+    side: np.ndarray  # [E] whose opponent they are after: 0 the first player's, 1 its own, else -1
+    wants: np.ndarray  # [E, 3] their w_r, r_d [m] and w_D⁺ of a catch
+
+
+NOBODY_ELSE = Others(np.zeros((0, 1, 2)), np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
+
+
+@dataclass(frozen=True)
 class Decision:
     """What was chosen, and out of how much."""
 
@@ -239,7 +251,11 @@ class GameTree:
         return out
 
     def game(
-        self, players: tuple[Player, Player], recent: tuple[int, ...] = (), now: float = 0.0
+        self,
+        players: tuple[Player, Player],
+        recent: tuple[int, ...] = (),
+        now: float = 0.0,
+        others: Others = NOBODY_ELSE,
     ) -> kernels.Game:
         """What the search needs besides the state; recent: stretches that the first used lately;
         now: the time [frames], from which goals count.
@@ -282,6 +298,9 @@ class GameTree:
             goal,
             float(now),
             GOAL_EVERY * fps,
+            others.track,
+            others.side,
+            others.wants,
             self.response,
             self._tired(players[0], recent),
         )
@@ -300,6 +319,7 @@ class GameTree:
         state: np.ndarray,
         players: tuple[Player, Player],
         recent: tuple[int, ...] = (),
+        others: Others = NOBODY_ELSE,
         *,
         bounds: bool = True,
     ) -> Decision:
@@ -311,7 +331,7 @@ class GameTree:
         """
         begin = time.perf_counter()
         now = min(state[kernels.END], state[kernels.FIELDS + kernels.END])
-        game = self.game(players, recent, now)
+        game = self.game(players, recent, now, others)
         bounds = bounds and not np.any(game.weights[:, COOPERATIVE])
         run = SEARCH.serial if bounds or players[0].depth < 3 else SEARCH.parallel
         found = run(game, state, players[0].depth, self.most, bounds)

@@ -57,6 +57,9 @@ from kumite.kernels.style import (
     TAKEN,
 )
 
+ROOM = 0.8  # m that is kept to others who are not the opponent
+CROWDED = 1e4  # score that is lost where there is none of it
+
 
 @lean_kernel
 def meets(k, begun, landed, other, other_begun, frame, since, until, moves, rules):
@@ -248,6 +251,30 @@ def movement(state, p, moves, want):
 
 
 @lean_kernel
+def among_others(state, p, moves, rules, want):
+    """What others add for player p at the end of its action: it is one against those who are after
+    it, too, their objectives summed with its opponent's (section VIII-B); nobody runs into anybody.
+    """
+    weights, third = want.weights, want.third
+    time = state[p * FIELDS + END]
+    x, z, _ = place_at(state, p, time, moves)
+    g = int((time - want.goal_from) / want.goal_every + 0.5)
+    g = min(max(g, 0), third.shape[1] - 1)
+    comp = 0.0
+    for e in range(third.shape[0]):
+        u, w = third[e, g, 0] - x, third[e, g, 1] - z
+        far = np.sqrt(u * u + w * w)
+        if want.third_side[e] == 1 - p:
+            mine, its = far - weights[p, PREFERRED_DISTANCE], far - want.third_wants[e, 1]
+            comp += want.third_wants[e, 0] * its * its - weights[p, DISTANCE] * mine * mine
+            if far < rules.catch:
+                comp -= weights[p, TAKEN] + want.third_wants[e, 2]
+        if far < ROOM:
+            comp -= CROWDED * (1.0 - far / ROOM)
+    return comp
+
+
+@lean_kernel
 def edge(state, before, p, moves, rules, want):
     """What it adds in ``state`` that player p has begun a stretch: comp, coop as p sees them.
 
@@ -261,6 +288,8 @@ def edge(state, before, p, moves, rules, want):
         given += want.weights[p, GIVEN_SHORT]
         taken += 1.0
     comp, there = movement(state, p, moves, want)
+    if want.third.shape[0] > 0:
+        comp += among_others(state, p, moves, rules, want)
     return comp + given - want.weights[p, TAKEN] * taken, coop + there
 
 
@@ -305,7 +334,7 @@ def choices(game, state, children, before, way, flaws):
     limit = worst_allowed(flaws)
     action, comps, coops, states = children.action, children.comp, children.coop, children.state
     weights, sign = want.weights, 1.0 if p == 0 else -1.0
-    coop_too = weights[p, PLACE] != 0.0 or weights[p, HEADING] != 0.0
+    more = weights[p, PLACE] != 0.0 or weights[p, HEADING] != 0.0 or want.third.shape[0] > 0
     count = 0
     for n in range(stretches.shape[0]):
         if flaws[n] >= limit:
@@ -325,7 +354,7 @@ def choices(game, state, children, before, way, flaws):
                 hit = begun + moves.tip_when[met]
         states[count, QUIET] = 1.0 if hit == np.inf else 0.0
         chosen = min(state[q * FIELDS + END], time + moves.duration[k])
-        if hit > chosen and rules.catch == 0.0 and not coop_too:
+        if hit > chosen and rules.catch == 0.0 and not more:
             row, other = moves.start[k] + moves.duration[k], first + min(moves.duration[k], last)
             u, w = carried(frame, moves.track[other, 0], moves.track[other, 1])
             u, w = u - moves.track[row, 0], w - moves.track[row, 1]

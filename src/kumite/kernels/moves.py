@@ -80,6 +80,9 @@ class Want(NamedTuple):
     goal: np.ndarray  # [2, G, 2] m, where to be now and every so many frames later; then as last
     goal_from: float  # frames, now
     goal_every: float  # frames
+    third: np.ndarray  # [E, G, 2] m, where others will be, at the same times
+    third_side: np.ndarray  # [E] 0, 1: they are after the opponent of that player; else NOTHING
+    third_wants: np.ndarray  # [E, 3] their w_r, r_d and what a catch is worth to them
     response: np.ndarray  # [2, SIZES] stretches of reactions to the trunk and the head, or NOTHING
     tired: np.ndarray  # [L] what it costs the searcher to begin a stretch: it did the like lately
 
@@ -136,6 +139,9 @@ def parts(game):
             game.goal,
             game.goal_from,
             game.goal_every,
+            game.third,
+            game.third_side,
+            game.third_wants,
             game.response,
             game.tired,
         ),

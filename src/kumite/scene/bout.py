@@ -14,11 +14,20 @@ import numpy as np
 from kumite.body import ARMS
 from kumite.clip import LIMBS
 from kumite.control import Progress, Route, style
-from kumite.control.game_tree import GOAL_EVERY, MEMORY, Decision, GameTree, Player
+from kumite.control.game_tree import (
+    GOAL_EVERY,
+    MEMORY,
+    NOBODY_ELSE,
+    Decision,
+    GameTree,
+    Others,
+    Player,
+)
 from kumite.errors import KumiteError, unknown
 from kumite.graph import Library
-from kumite.kernels.blow import NO_BLOW
+from kumite.kernels.blow import NO_BLOW, NOBODY
 from kumite.kernels.moves import FALL, NOTHING
+from kumite.rotation import planar_compose
 from kumite.scene.apart import push_apart
 from kumite.scene.controls import (
     ORDERS,
@@ -27,7 +36,7 @@ from kumite.scene.controls import (
     check_orders,
     style_controls,
 )
-from kumite.scene.fighters import BoutSettings
+from kumite.scene.fighters import NEAREST, BoutSettings
 from kumite.scene.floor import Floor, Landing
 from kumite.scene.reactions import MOST_PHYSICAL, Reactions
 from kumite.scene.recording import Event
@@ -35,6 +44,7 @@ from kumite.scene.settings import SceneSettings
 from kumite.scene.stage import SceneObject
 from kumite.scene.story import CueSettings, Story
 
+NEAR = 6.0  # m within which others are minded
 GOALS = 25  # places ahead of which a fighter knows: 6 s
 
 
@@ -123,7 +133,8 @@ class BoutScene:
         self.cast = cast = self.floor.cast
         table = self.library.table
         number = {name: k for k, name in enumerate(self.names)}
-        self.floor.opponent[:] = [number[f.against] for f in self.settings.fighters]
+        self.floor.opponent[:] = [number.get(f.against, NOBODY) for f in self.settings.fighters]
+
         # Everyone starts where idling or moving about has ended, with many ways out.
         calm = np.isin(self.tree.kinds, ("transition", "idle"))
         ways = np.diff(table.action_start)[table.target] * calm
@@ -144,6 +155,9 @@ class BoutScene:
             facing = np.array([*f.position, np.radians(f.yaw_deg)]) + moved[k]
             cast.place(k, int(table.target[self.stretch[k]]), facing)
         self.floor.start()
+        self._nearest = self.floor.opponent == NOBODY
+        for k in np.flatnonzero(self._nearest).tolist():
+            self._turn_to_nearest(k)
         self.reactions.start(self.floor)
 
     @property
@@ -195,6 +209,8 @@ class BoutScene:
     # Deciding ------------------------------------------------------------------------------------
 
     def _choose(self, k: int) -> None:
+        if self._nearest[k]:
+            self._turn_to_nearest(k)
         cast, table, o = self.cast, self.library.table, int(self.floor.opponent[k])
         facing = cast.facing
         pair = (k, o)
@@ -213,7 +229,8 @@ class BoutScene:
             (self._landed[k], self._landed[o]),
         )
         players = (self._player(k), self._player(o))
-        decision = self.tree.decide(state, players, tuple(self._recent[k]))
+        others = self._others(k, o)
+        decision = self.tree.decide(state, players, tuple(self._recent[k]), others)
         self.decisions.append(decision)
         self._recent[k].append(decision.stretch)
         self._begin(k, decision.stretch)
@@ -230,6 +247,36 @@ class BoutScene:
             jump=bool(cast.jump[k]),
             **({"outside_set": True} if decision.outside else {}),
         )
+
+    def _turn_to_nearest(self, k: int) -> None:
+        """Character k minds the nearest of those who are after it, or of all."""
+        place = self.cast.root_position[:, [0, 2]]
+        far = np.linalg.norm(place - place[k], axis=1)
+        after = self.floor.opponent == k
+        far[~after if after.any() else np.arange(len(far)) == k] = np.inf
+        self.floor.opponent[k] = int(np.argmin(far))
+
+    def _others(self, k: int, o: int) -> Others:
+        """Who else is near character k and its opponent, as the tree is told of them."""
+        place = self.cast.root_position[:, [0, 2]]
+        near = np.linalg.norm(place - place[k], axis=1) < NEAR
+        near[[k, o]] = False
+        near |= np.isin(self.floor.opponent, [k, o])  # after one of the two, wherever they are
+        near[[k, o]] = False
+        who = np.flatnonzero(near)
+        if len(who) == 0:
+            return NOBODY_ELSE
+        step = np.arange(GOALS) * round(GOAL_EVERY * self.fps)
+        cast, facing = self.cast, self.library.clips.facing
+        frame = np.minimum(
+            cast.frame[who, None] + step, np.maximum(cast.stop, cast.frame)[who, None]
+        )
+        track = planar_compose(cast.anchor[who, None], facing[frame])[..., :2]
+        after = self.floor.opponent[who]
+        side = np.where(after == o, 0, np.where(after == k, 1, -1))
+        styles = [self.players[e].style for e in who.tolist()]
+        wants = [(s.distance, s.preferred_distance, s.given_short) for s in styles]
+        return Others(track, side, np.array(wants))
 
     def _player(self, k: int) -> Player:
         """A fighter as it plays now: with where it is to be, and what is wanted there."""
@@ -292,7 +339,9 @@ class BoutScene:
         player = self.players[k]
         self._kept.setdefault(k, dict(vars(player)))
         if cue.against is not None:
-            self.floor.opponent[k] = self.names.index(cue.against)
+            self._nearest[k] = cue.against == NEAREST
+            if not self._nearest[k]:
+                self.floor.opponent[k] = self.names.index(cue.against)
         if cue.style is not None:
             player.style = style(cue.style)
         if cue.depth is not None:

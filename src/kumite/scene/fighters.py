@@ -20,6 +20,9 @@ Name = Annotated[str, Field(min_length=1, max_length=60)]
 Depth = Annotated[int, Field(ge=1, le=DEEPEST)]
 
 
+NEAREST = "nearest"  # of those who are after one, or of all
+
+
 class Settings(BaseModel):
     """What a file may say: no other keys, and nothing changes later."""
 
@@ -115,7 +118,7 @@ class FighterSettings(Manner):
     name: Name
     position: tuple[Metres, Metres]  # m, x and z
     yaw_deg: Finite = 0.0  # 0 faces +Z
-    against: Name
+    against: Name  # another fighter, or "nearest": of those who are after it
     point: tuple[CheckPointSettings, ...] = ()
     path: PathSettings | None = None  # before the points
 

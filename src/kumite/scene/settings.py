@@ -16,6 +16,7 @@ from kumite import toml
 from kumite.errors import KumiteError
 from kumite.scene.fighters import (
     FARTHEST,
+    NEAREST,
     BoutSettings,
     FighterSettings,
     Finite,
@@ -27,7 +28,6 @@ from kumite.scene.formation import MOST_PAIRS, PairsSettings
 from kumite.scene.story import CueSettings, VehicleSettings
 
 Weight = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-NEAREST = "nearest"  # aims at the nearest character that is free
 CROWD_SPACING = 1.5  # m between the two of a pair; pairs stand twice as far apart
 
 
@@ -195,6 +195,8 @@ class SceneSettings(Settings):
 
     @staticmethod
     def _refuse_stranger(name: str, against: str, known: set[str]) -> None:
+        if against == NEAREST and len(known) > 1:
+            return
         if against == name or against not in known:
             others = ", ".join(sorted(known - {name})) or "nobody else"
             raise ValueError(f"{name} is against {against!r}; expected another fighter ({others})")
@@ -208,7 +210,7 @@ class SceneSettings(Settings):
     def aims(self) -> dict[str, str]:
         """Whom each aims at that always aims at the same."""
         found = {c.name: c.aims_at for c in self.characters if c.aims_at != NEAREST}
-        return found | {f.name: f.against for f in self.fighters}
+        return found | {f.name: f.against for f in self.fighters if f.against != NEAREST}
 
 
 def with_count(settings: SceneSettings, count: int) -> SceneSettings:
