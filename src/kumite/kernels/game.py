@@ -379,6 +379,33 @@ def choices(game, state, children, before, way, flaws):
     return count, stretches.shape[0], p
 
 
+@lean_kernel
+def look_at(game, state, stretches, way, flaws):
+    """Flaws [n] of whoever is next beginning one of stretches [n]; way [m, 5]: room."""
+    moves, rules, _ = parts(game)
+    p = next_player(state)
+    q = 1 - p
+    time = state[p * FIELDS + END]
+    x, z, yaw = place_at(state, p, time, moves)
+    opposing, begun = int(state[q * FIELDS + STRETCH]), state[q * FIELDS + BEGUN]
+    done = min(max(int(time - begun), 0), moves.duration[opposing])
+    first, last = moves.start[opposing] + done, moves.duration[opposing] - done
+    frame = seen_from(state, q, x, z, yaw)
+    attacked = moves.kind[opposing] == ATTACK and begun + moves.last_tip[opposing] >= time
+    stands = way_of(first, last, frame, moves, rules.stride, way)
+    facing = rules.facing[p]
+    judge(stretches, first, last, frame, way, stands, attacked, facing, False, moves, rules, flaws)
+
+
+@kernel
+def flaws_of(game, state, k):
+    """What is wrong with whoever is next beginning stretch k: see :mod:`kumite.kernels.prune`."""
+    flaws = np.zeros(1, dtype=np.int64)
+    room = game.duration.max() // game.stride + 2
+    look_at(game, state, np.array([k]), np.empty((room, 5)), flaws)
+    return flaws[0]
+
+
 @kernel
 def expand(game, state, children):
     """All that whoever is next can do and should consider: see :mod:`kumite.kernels.search`."""

@@ -45,6 +45,7 @@ from kumite.scene.stage import SceneObject
 from kumite.scene.story import CueSettings, Story
 
 NEAR = 6.0  # m within which others are minded
+FREE = 1.5  # times the distance of a catch: so far one has got away
 GOALS = 25  # places ahead of which a fighter knows: 6 s
 
 
@@ -147,6 +148,7 @@ class BoutScene:
         self.progress = [None if r is None else Progress(r) for r in self.routes]
         self._done: list[set[str]] = [set() for _ in range(count)]
         self._told = [0] * count
+        self._caught = np.zeros(count, dtype=bool)
         self._landed = [NO_BLOW] * count  # the blow each has landed last in what it is doing
         bout = self.bout
         spread = np.array([bout.scatter, bout.scatter, np.radians(bout.scatter_deg)])
@@ -188,6 +190,8 @@ class BoutScene:
             push_apart(self.floor)
         self.frame += 1
         self._pass_check_points()
+        if self.bout.catch:
+            self._catch()
         if happened:
             for k, s, blow in self.floor.thrown:
                 self._event("strike", k, limb=LIMBS[s], blow=blow)
@@ -246,6 +250,7 @@ class BoutScene:
             pruned=round(decision.pruned, 4),
             jump=bool(cast.jump[k]),
             **({"outside_set": True} if decision.outside else {}),
+            **({"flaws": ", ".join(decision.flaws)} if decision.flaws else {}),
         )
 
     def _turn_to_nearest(self, k: int) -> None:
@@ -367,6 +372,18 @@ class BoutScene:
     def drag(self, k: int, way: np.ndarray) -> None:
         """Character k is moved over the ground by way [2] m, feet and all."""
         self.cast.anchor[k, :2] += way
+
+    def _catch(self) -> None:
+        """Tell whom somebody has come so near that it counts; again after it has got away."""
+        place, opponent = self.cast.root_position[:, [0, 2]], self.floor.opponent
+        far = np.linalg.norm(place - place[opponent], axis=1)
+        wants = np.array([p.style.preferred_distance for p in self.players])
+        near = (far < self.bout.catch) & (wants < wants[opponent])
+        for k in np.flatnonzero(near & ~self._caught).tolist():
+            self._event(
+                "caught", k, victim=self.names[opponent[k]], distance=round(float(far[k]), 3)
+            )
+        self._caught = near | (self._caught & (far < FREE * self.bout.catch))
 
     # Check points --------------------------------------------------------------------------------
 
