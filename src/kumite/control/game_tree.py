@@ -20,8 +20,8 @@ from kumite.control.styles import STYLES, VULNERABILITY, Style, short_range
 from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.kernels import game as fight
-from kumite.kernels import prune
 from kumite.kernels import moves as kernels
+from kumite.kernels import prune
 from kumite.kernels.blow import NO_BLOW
 from kumite.kernels.moves import FALL, FLINCH, NOTHING, SIZES, STAGGER
 from kumite.kernels.search import make_search

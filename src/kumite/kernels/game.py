@@ -371,7 +371,7 @@ def choices(game, state, children, before, way, flaws):
             comp, coop = edge(states[count], before, p, moves, rules, want)
         comp += weights[p, SUITABILITY] * want.suits[k, opposing]
         action[count], comps[count] = k, sign * comp
-        # Of the way to a check point counts what is gained: few long actions are not better than many.
+        # Of the way to a check point counts what is gained: few long actions are no better.
         coops[count] = coop - coop_here + weights[p, REQUIREMENT] * want.asked[p, k]
         if p == 0:
             comps[count] -= want.tired[k]
