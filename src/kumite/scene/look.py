@@ -27,8 +27,8 @@ def car(size: tuple[float, float, float]) -> tuple[Part, ...]:
     """A car that fills a box of this width, height and length [m]."""
     width, height, length = size
     sill, bonnet = -0.32 * height, 0.08 * height
-    body = np.array([[sill, -0.5], [sill, 0.5], [bonnet, 0.47], [bonnet, -0.5]])
-    cabin = np.array([[bonnet, -0.38], [bonnet, 0.22], [0.5 * height, 0.06], [0.5 * height, -0.30]])
+    body = np.array([[sill, -0.5], [bonnet, -0.5], [bonnet, 0.47], [sill, 0.5]])
+    cabin = np.array([[bonnet, -0.38], [0.5 * height, -0.30], [0.5 * height, 0.06], [bonnet, 0.22]])
     around = 2.0 * np.pi * np.arange(WHEEL_SIDES) / WHEEL_SIDES
     radius, tyre = 0.22 * height, 0.14 * width
     wheel = radius * np.stack([np.cos(around), np.sin(around)], axis=1)
@@ -46,7 +46,7 @@ def car(size: tuple[float, float, float]) -> tuple[Part, ...]:
 
 
 def _prism(profile: np.ndarray, low: float, high: float) -> tuple[np.ndarray, ...]:
-    """A convex profile [n, 2] of (y, z), anticlockwise from +X, drawn along X from low to high.
+    """A convex profile [n, 2] of (y, z), turning from +Y to +Z, drawn along X from low to high.
 
     Vertices [V, 3], normals [V, 3], faces [P, 3]; each side is flat.
     """
