@@ -4,10 +4,9 @@ from kumite import BoutScene, builtin_library, load_scene
 
 TOLD = ("cue", "run over", "reaction")
 
-for name in ("car", "alley"):
+for name, style in (("car", "boxing"), ("alley", "sword")):
     settings = load_scene(name)
-    library = builtin_library(None, style=settings.bout.library, level="actions")
-    scene = BoutScene(settings, library, seed=0)
+    scene = BoutScene(settings, builtin_library(None, style=style, level="actions"), seed=0)
     for _ in range(25 * round(scene.fps)):
         scene.step()
     print(settings.about)
