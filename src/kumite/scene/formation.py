@@ -61,7 +61,7 @@ class PairsSettings(Settings):
         """Places [points, 2] and times [points] of every pair."""
         rings = max(1, round(np.sqrt(self.count / 8.0)))
         arms = -(-self.count // rings)
-        innermost = max(arms * self.spacing / (2.0 * np.pi), 1.0)
+        innermost = max(0.5 * self.spacing / np.sin(np.pi / arms), 1.0) if arms > 1 else 1.0
         share = np.linspace(0.0, 1.0, self.points)
         # Nobody's way is longer than the speed asks for, and it spreads by 0.6 of that at least.
         length = self.speed * self.seconds
