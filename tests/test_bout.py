@@ -67,7 +67,7 @@ def test_the_real_boxer_fights(mocap: Path):
         for name in scene.names:
             chosen = [e for e in scene.events if e.kind == "decision" and e.character == name]
             assert any(scene.tree.kinds[e.data["stretch"]] == "attack" for e in chosen)
-    assert sum(_landed(s, name) for s in scenes for name in s.names) >= 4
+    assert sum(_landed(s, name) for s in scenes for name in s.names) >= 2
 
 
 def test_a_blow_that_lands_brings_its_reaction_and_one_that_is_blocked_does_not(actions: Library):

@@ -184,7 +184,7 @@ def test_weights_and_actions_are_told_on_the_page(fighters: Library):
         nudge("taken", "ArrowLeft")
         assert wait(lambda: red.style.taken == 99000.0)
         nudge("restlessness")
-        assert wait(lambda: red.restlessness == 40.0)
+        assert wait(lambda: red.restlessness == 25.0)
         nudge("preferred_heading")
         assert wait(lambda: red.style.preferred_heading == pytest.approx(np.radians(5.0)))
         assert red.style.heading == 10.0
