@@ -40,6 +40,7 @@ BOREDOM = 1e5  # score that an action loses for each recent use: a blow of 1 m/s
 RESTLESSNESS = 15.0  # score that an action loses for each recent one of its kind
 MEMORY = 8  # actions back that "recently" goes
 GOAL_EVERY = 0.25  # s
+CALM = ("transition", "idle")  # kinds of who waits
 OUTSIDE = 1e12  # score that an action loses which is not in the set: more than all else together
 COOPERATIVE = [HEADING, PLACE, REQUIREMENT]  # columns of weights
 
@@ -155,8 +156,7 @@ class GameTree:
     @cached_property
     def kind_number(self) -> np.ndarray:
         """[L] the same number for stretches of one kind; idling counts as moving about."""
-        calm = ["transition" if k == "idle" else k for k in self.kinds]
-        return np.unique(calm, return_inverse=True)[1]
+        return np.unique(["wait" if k in CALM else k for k in self.kinds], return_inverse=True)[1]
 
     @cached_property
     def names(self) -> frozenset[str]:
@@ -318,11 +318,20 @@ class GameTree:
     def _tired(self, player: Player, recent: tuple[int, ...]) -> np.ndarray:
         """What each stretch [L] costs the searcher: if it was among its recent choices, or many of
         its kind; and if it is not in its action set.
+
+        An attack rests whoever has waited as far as its style cares for it: hooks an infighter.
         """
         out, lately, kinds = np.zeros(len(self.kinds)), list(recent), self.kind_number
         np.add.at(out, lately, player.boredom)
-        like = np.bincount(kinds[lately], minlength=int(kinds.max()) + 1)
-        return out + player.restlessness * like[kinds] + OUTSIDE * ~self.allowed(player)
+        like = np.bincount(kinds[lately], minlength=int(kinds.max()) + 1)[kinds].astype(float)
+        attack, calm = self.moves.kind == kernels.ATTACK, np.isin(self.kinds, CALM)
+        if attack.any() and calm.any():
+            style = player.style
+            given = np.where(self.moves.short, style.given_short, style.given_long)
+            share = given / max(style.given_short, style.given_long, 1e-9)
+            waited = like[calm][0]
+            like[attack] += (1.0 - share[attack]) * max(waited - like[attack][0], 0.0)
+        return out + player.restlessness * like + OUTSIDE * ~self.allowed(player)
 
     def decide(
         self,
