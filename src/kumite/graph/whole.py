@@ -87,10 +87,11 @@ def build_action_library(
     chosen = actions.kind != KINDS.index("reaction")
     keep = _connected(start_node, end_node, nodes, keep, chosen)
     usable = keep & chosen
-    if usable.sum() < 2:
+    if usable.sum() < 2 or np.all(actions.kind[usable] == KINDS.index("idle")):
         raise KumiteError(
             f"too few actions for a graph: of {len(actions)} found, {int(usable.sum())} are "
-            "connected and can be chosen; expected at least 2 (more clips, or a larger --alike)"
+            "connected and can be chosen; expected at least 2, not only rests (more clips, or a "
+            "larger --alike)"
         )
     order = np.flatnonzero(keep)
     state_frame = last[order]  # ascending: actions are in order and do not overlap
