@@ -159,6 +159,35 @@ def fights(scene: str, seeds: int, motion: str | None = None, **more) -> list[Fi
     return list(pool().map(play, jobs))
 
 
+def _off_path(at: np.ndarray, route: Route) -> np.ndarray:
+    """How far places [F, 2] are from the line through a route's check points [F] m."""
+    p = route.places
+    way = np.diff(p, axis=0)
+    d = at[:, None] - p[:-1]
+    along = np.clip((d * way).sum(-1) / np.maximum((way**2).sum(-1), 1e-12), 0.0, 1.0)
+    return np.linalg.norm(d - along[..., None] * way, axis=-1).min(axis=1)
+
+
+def _off_time(at: np.ndarray, route: Route, fps: float) -> np.ndarray:
+    """How far places [F, 2] are from where the route's times have it [F] m."""
+    when = np.array([p.time for p in route.points], dtype=float)
+    now = np.arange(1, len(at) + 1) / fps
+    due = np.stack([np.interp(now, when, route.places[:, i]) for i in range(2)], axis=1)
+    return np.linalg.norm(at - due, axis=1)
+
+
+def _between_pairs(ground: np.ndarray) -> float:
+    """The smallest distance between any two of different pairs [m]; fighters 2k, 2k + 1 are one."""
+    if ground.shape[1] < 3:
+        return np.inf
+    least = np.inf
+    for here in ground:
+        distance, index = KDTree(here).query(here, k=3)  # oneself, perhaps one's rival, another
+        other = index // 2 != np.arange(len(here))[:, None] // 2
+        least = min(least, float(np.asarray(distance)[other].min(initial=np.inf)))
+    return least
+
+
 @dataclass(frozen=True)
 class Followed:
     """How pairs kept to their paths. P pairs, K fighters."""
