@@ -81,7 +81,6 @@ def _said(met: bool) -> str:
 def pruning(seeds: int) -> str:
     """Table V."""
     runs = [("boxing", n, 2 * seeds) for n in boxers()]
-    runs += [("boxing", n + ALL_WAYS, max(seeds // 4, 1)) for n in boxers()]
     runs += [("sword", "sword", 2 * seeds), ("chase", "locomotion", 2 * seeds)]
     rows, why = [], []
     for scene, name, count in runs:
