@@ -24,6 +24,8 @@ from kumite.scene import BoutScene, SceneSettings, load_scene, with_count
 FIRST_SEED = 100  # no settings were chosen with this one or those after it in view
 SECONDS = 30.0
 WORKERS = 2
+# Where everyone begins, besides in which of a few postures: else some seeds give the same fight.
+SCATTER = {"scatter": 0.05, "scatter_deg": 5.0}
 REAL = "real boxer"
 ALL_WAYS = ", all ways"  # of a library: a state offers whatever joins, however many that are
 
@@ -43,6 +45,9 @@ class Job:
     @property
     def settings(self) -> SceneSettings:
         settings = load_scene(self.scene)
+        if settings.bout is not None and settings.bout.scatter == 0:
+            bout = settings.bout.model_copy(update=SCATTER)
+            settings = settings.model_copy(update={"bout": bout})
         return settings if self.pairs is None else with_count(settings, self.pairs)
 
 
