@@ -7,6 +7,7 @@ kumite.kernels.game but its tuples, which :meth:`Toy.game` fills.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -320,35 +321,43 @@ class Toy:
             both = [me, other]
             both[p], both[1 - p] = self.begin(k, time, self.place(me, time)), other
             after, score, dealt, reacted, caught = self.play(both, time, False)
-            end = after[p].end
-            x, z, yaw = self.place(after[p], end)
-            u, w, _ = self.place(after[1 - p], end)
-            theta = float(wrap_angle(math.atan2(u - x, w - z) - yaw - style.preferred_facing))
-            r = math.dist((x, z), (u, w))
-            comp = -style.facing * theta**2 - style.distance * (r - style.preferred_distance) ** 2
+            comp, coop = self.standing(p, after, after[p].end)
+            coop += reacted - self.standing(p, state.fighters, time)[1]
             comp += score[p] - style.taken * dealt[1 - p]  # Eq. 5
             if caught:
                 comp += style.given_short - style.taken
-            for at, after_whom, wants in zip(self.third, self.third_side, self.third_wants):
-                far = math.dist((x, z), at[int(min(max(end + 0.5, 0), len(at) - 1))])
-                if after_whom == 1 - p:
-                    comp += wants[0] * (far - wants[1]) ** 2
-                    comp -= style.distance * (far - style.preferred_distance) ** 2
-                    if far < self.catch:
-                        comp -= style.taken + wants[2]
-                comp -= 1e4 * max(1.0 - far / 0.8, 0.0)
             if self.suits is not None:
                 comp += style.suitability * float(np.float32(self.suits[k, other.move]))  # Eq. 7
             if p == 0:
                 comp -= self.tired.get(k, 0.0)
-            coop = reacted + side.asked.get(k, 0) * style.requirement  # Eq. 10
-            if side.goal is not None:
-                coop -= style.place * math.dist((x, z), side.goal) ** 2  # Eq. 9
-            if style.heading:
-                assert style.preferred_heading is not None
-                coop -= style.heading * float(wrap_angle(yaw - style.preferred_heading)) ** 2
+            coop += side.asked.get(k, 0) * style.requirement  # Eq. 10
             edges.append(Edge(k, comp if p == 0 else -comp, coop, Moment(after)))
         return edges
+
+    def standing(self, p: int, fighters: Sequence[Fighter], time: int) -> tuple[float, float]:
+        """Eq. 4, with what others make of it, and Eq. 9."""
+        side = self.sides[p]
+        style = side.style
+        x, z, yaw = self.place(fighters[p], time)
+        u, w, _ = self.place(fighters[1 - p], time)
+        theta = float(wrap_angle(math.atan2(u - x, w - z) - yaw - style.preferred_facing))
+        r = math.dist((x, z), (u, w))
+        comp = -style.facing * theta**2 - style.distance * (r - style.preferred_distance) ** 2
+        for at, after_whom, wants in zip(self.third, self.third_side, self.third_wants):
+            far = math.dist((x, z), at[int(min(max(time + 0.5, 0), len(at) - 1))])
+            if after_whom == 1 - p:
+                comp += wants[0] * (far - wants[1]) ** 2
+                comp -= style.distance * (far - style.preferred_distance) ** 2
+                if far < self.catch:
+                    comp -= style.taken + wants[2]
+            comp -= 1e4 * max(1.0 - far / 0.8, 0.0)
+        coop = 0.0
+        if side.goal is not None:
+            coop -= style.place * math.dist((x, z), side.goal) ** 2
+        if style.heading:
+            assert style.preferred_heading is not None
+            coop -= style.heading * float(wrap_angle(yaw - style.preferred_heading)) ** 2
+        return comp, coop
 
     def leaf(self, state: Moment) -> tuple[float, float]:
         since = min(f.end for f in state.fighters)

@@ -19,7 +19,7 @@ from kumite.control.styles import STYLES, Style
 from kumite.errors import KumiteError
 from kumite.graph import ActionTable, Library, build_action_library
 from kumite.kernels import moves as kernels
-from kumite.kernels.game import expand, leaves
+from kumite.kernels.game import expand, flaws_of, leaves
 from kumite.kernels.moves import ATTACK, DEFENCE, NOTHING
 from kumite.kernels.search import empty_children
 from tests import toys
@@ -380,11 +380,13 @@ def test_check_points_and_headings_cost_both_alike():
     side = Side(style, goal=(1.0, 0.2))
     toy = Toy([still(10), walk(10, (0, 0.2, 0.3))], [[1]], sides=(side, Side(FREE)))
     (child,) = expanded(toy, facing(toy, 1.2, end=20))
-    assert child.comp == 0.0 and child.coop == pytest.approx(-4.08)
+    before = -4.0 * (1.0**2 + 0.2**2) - 2.0 * 0.1**2  # what counts is what it gains
+    assert child.comp == 0.0 and child.coop == pytest.approx(-4.08 - before)
     toy.sides = (Side(FREE), replace(side, goal=(0.0, 2.0)))
     (child,) = expanded(toy, facing(toy, 1.2, end=-1))  # to (0, 1.0), and it looks back
     turn = math.pi + 0.3 - 0.1 - 2 * math.pi
-    assert child.coop == pytest.approx(-4.0 - 2.0 * turn**2)
+    before = -4.0 * 0.8**2 - 2.0 * (math.pi - 0.1) ** 2
+    assert child.coop == pytest.approx(-4.0 - 2.0 * turn**2 - before)
 
 
 def test_wanted_and_unwanted_actions_and_reactions():
@@ -527,6 +529,30 @@ def sizes(tree: GameTree, depth: int) -> tuple[list[int], list[int], dict[str, i
         more = SEARCH.serial(game, children.state[n], depth - 1, tree.most, False).nodes.sum()
         below[label] = below.get(label, 0) + int(more)
     return found.nodes.tolist(), found.considered.tolist(), below
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_what_is_wrong_with_an_action_is_told(seed: int):
+    toy, now = random_toy(seed, seed % 2 == 0)
+    p = toy.player(now)
+    me, other = now.fighters[p], now.fighters[1 - p]
+    for k in toy.offered(now):
+        expected = sum(
+            2 ** (4 - n) for n, wrong in enumerate(toy.flaws(me, other, k, me.end)) if wrong
+        )
+        assert flaws_of(toy.game(), as_state(now), k) == expected
+
+
+def test_a_fight_says_which_rules_had_to_be_broken(performer_tree: GameTree):
+    tree, moves = performer_tree, performer_tree.moves
+    k = int(np.flatnonzero(np.array(tree.kinds) == "idle")[0])
+    far = [np.array([0.0, 0.0, 0.0]), np.array([0.0, -1.5, 0.0])]  # behind the one who chooses
+    ends = (0.0, float(moves.duration[k]))
+    state = tree.state((k, k), (-ends[1], 0.0), ends, (far[0], far[1]), 0.0)
+    decision = tree.decide(state, (Player(depth=1), Player()))
+    assert decision.flaws == ("turned away",)
+    state = tree.state((k, k), (-ends[1], 0.0), ends, (far[0], -far[1]), 0.0)
+    assert tree.decide(state, (Player(depth=1), Player())).flaws == ()
 
 
 def test_the_size_of_a_fixed_fight(performer_tree: GameTree):

@@ -118,6 +118,22 @@ def worlds(document: dict, binary: bytes, frame: int) -> dict[int, np.ndarray]:
     return out
 
 
+def test_a_box_is_a_car_that_points_its_way(recording: Recording, tmp_path: Path):
+    size, yaw = [1.7, 1.4, 4.0], 2.2
+    told = {"object_radius": {"ball": 2.0}, "object_size": {"ball": size}}
+    boxed = replace(recording, settings={**told, "object_yaw": {"ball": yaw}})
+    write_glb(tmp_path / "box.glb", boxed)
+    document, binary = parse(tmp_path / "box.glb")
+    (n,) = (n for n, node in enumerate(document["nodes"]) if node["name"] == "ball")
+    parts = document["meshes"][document["nodes"][n]["mesh"]]["primitives"]
+    assert len(parts) == 3
+    own = np.concatenate([read(document, binary, p["attributes"]["POSITION"]) for p in parts])
+    assert np.allclose(np.ptp(own, axis=0), size, atol=0.02)
+    front = np.array([0.0, 0.0, 2.0, 1.0])
+    at = (worlds(document, binary, 7)[n] @ front)[:3] - boxed.object_position[7, 0]
+    assert np.allclose(at, [2.0 * np.sin(yaw), 0.0, 2.0 * np.cos(yaw)], atol=1e-4)
+
+
 def test_joints_and_skin_are_where_ours_are(recording: Recording, written: Path):
     document, binary = parse(written)
     mesh = body_mesh(recording.skeleton)

@@ -366,9 +366,9 @@ def _places(folder: Path):
     scene = BoutScene(load_scene("boxing"), build_action_library(_clips(folder)), seed=1)
     tree, decide, found = scene.tree, scene.tree.decide, []
 
-    def note(state, players, recent):
-        found.append((tree.game(players, recent), state, players, recent))
-        return decide(state, players, recent)
+    def note(state, players, recent, others):
+        found.append((tree.game(players, recent, others=others), state, players, recent))
+        return decide(state, players, recent, others)
 
     vars(tree)["decide"] = note
     record(scene, FIGHT_SECONDS)

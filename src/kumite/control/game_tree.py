@@ -21,6 +21,7 @@ from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.kernels import game as fight
 from kumite.kernels import moves as kernels
+from kumite.kernels import prune
 from kumite.kernels.blow import NO_BLOW
 from kumite.kernels.moves import FALL, FLINCH, NOTHING, SIZES, STAGGER
 from kumite.kernels.search import make_search
@@ -108,6 +109,7 @@ class Decision:
     considered: np.ndarray  # [D + 1] the same before pruning
     seconds: float
     outside: bool = False  # of the action set: nothing in it could be done
+    flaws: tuple[str, ...] = ()  # rules of pruning that it breaks: no action passes them all
 
     @property
     def pruned(self) -> float:
@@ -115,6 +117,14 @@ class Decision:
         return 1.0 - float(self.nodes[1:].sum()) / max(float(self.considered[1:].sum()), 1.0)
 
 
+FLAWS = {
+    prune.ENDS_INSIDE: "ends inside",
+    prune.OVERLAPS: "overlaps",
+    prune.TURNED_AWAY: "turned away",
+    prune.TOO_FAR: "too far",
+    prune.ILLOGICAL: "illogical",
+}
+"""What may be wrong with an action that is chosen all the same, for want of a better one."""
 SEARCH = make_search(fight.expand, fight.leaves)
 
 
@@ -337,6 +347,7 @@ class GameTree:
         found = run(game, state, players[0].depth, self.most, bounds)
         best = found.best
         action, comp = int(found.action[best]), float(found.comp[best])
+        flaws = int(fight.flaws_of(game, state, action))
         return Decision(
             action,
             comp + OUTSIDE * round(-comp / OUTSIDE),  # without what it cost to leave the set
@@ -345,6 +356,7 @@ class GameTree:
             found.considered,
             time.perf_counter() - begin,
             not self.allowed(players[0])[action],
+            tuple(name for flaw, name in FLAWS.items() if flaws & flaw),
         )
 
 

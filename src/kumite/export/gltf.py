@@ -1,4 +1,4 @@
-"""GLB out: one skinned, animated body a character, and the scene's objects as spheres.
+"""GLB out: one skinned, animated body a character, and the scene's objects.
 
 glTF 2.0: metres, right-handed, Y up like ours; only its quaternions are xyzw. Each joint is a node;
 the skin's inverse bind matrices undo the rest pose, in which no joint is turned. Joints that never
@@ -20,14 +20,15 @@ from kumite.body import BodyMesh, body_mesh, palette
 from kumite.body.mesh import ROLES
 from kumite.clip import MOST_FRAMES, NO_PARENT, Skeleton
 from kumite.errors import KumiteError
-from kumite.rotation import continuous, slerp
+from kumite.rotation import continuous, from_yaw, slerp
+from kumite.scene.look import car
 from kumite.scene.recording import Recording
+from kumite.scene.stage import recorded_objects
 
 GENERATOR = "Kumite"
 STILL = 1e-6  # a channel whose values differ by less than this is left out
 OBJECT_COLOUR = (0.95, 0.75, 0.15)
-OBJECT_RADIUS = 0.1  # m, where a recording does not say
-_ROUGHNESS = {"gloves": 0.35, "shoes": 0.45, "skin": 0.6}
+_ROUGHNESS = {"gloves": 0.35, "shoes": 0.45, "skin": 0.6, "paint": 0.4, "glass": 0.2}
 
 
 def write_glb(path: Path | str, recording: Recording, *, fps: float | None = None) -> None:
@@ -268,34 +269,65 @@ def _unit(xyzw: np.ndarray) -> list[float]:
 
 
 def _add_objects(document: _Document, recording: Recording) -> None:
-    if not recording.objects:
-        return
+    """Balls, which share one unit sphere, and boxes, each a car."""
+    sphere = None
+    for o, thing in enumerate(recorded_objects(recording)):
+        if thing.size is not None:
+            mesh, scale = _add_car(document, thing.name, thing.size), None
+        else:
+            mesh = sphere = _add_sphere(document) if sphere is None else sphere
+            scale = [thing.radius] * 3
+        xyzw = np.roll(from_yaw(thing.yaw), -1)
+        node = gltf.Node(
+            name=thing.name,
+            mesh=mesh,
+            translation=[float(x) for x in recording.object_position[0, o]],
+            rotation=_unit(xyzw) if thing.yaw else None,
+            scale=scale,
+        )
+        index = document.add_node(node, top=True)
+        document.animate(index, "translation", recording.object_position[:, o], gltf.VEC3)
+
+
+def _add_sphere(document: _Document) -> int:
     vertices, faces = _sphere()
+    material = document.add_material("object", OBJECT_COLOUR, 0.5)
+    return _add_mesh(
+        document, "sphere", [_primitive(document, vertices, vertices, faces, material)]
+    )
+
+
+def _add_car(document: _Document, name: str, size: tuple[float, float, float]) -> int:
+    primitives = []
+    for part in car(size):
+        rough = _ROUGHNESS.get(part.name, 0.8)
+        material = document.add_material(f"{name} {part.name}", part.colour, rough)
+        primitives.append(
+            _primitive(
+                document, part.vertices, part.normals, part.faces.astype(np.uint16), material
+            )
+        )
+    return _add_mesh(document, name, primitives)
+
+
+def _add_mesh(document: _Document, name: str, primitives: list[gltf.Primitive]) -> int:
+    document.root.meshes.append(gltf.Mesh(name=name, primitives=primitives))
+    return len(document.root.meshes) - 1
+
+
+def _primitive(
+    document: _Document,
+    vertices: np.ndarray,
+    normals: np.ndarray,
+    faces: np.ndarray,
+    material: int,
+) -> gltf.Primitive:
     attributes = gltf.Attributes(
         POSITION=document.add(vertices, gltf.VEC3, target=gltf.ARRAY_BUFFER, bounds=True),
-        NORMAL=document.add(vertices, gltf.VEC3, target=gltf.ARRAY_BUFFER),
+        NORMAL=document.add(normals, gltf.VEC3, target=gltf.ARRAY_BUFFER),
     )
     indices = document.add(faces.ravel(), gltf.SCALAR, target=gltf.ELEMENT_ARRAY_BUFFER)
-    material = document.add_material("object", OBJECT_COLOUR, 0.5)
-    document.root.meshes.append(
-        gltf.Mesh(
-            name="sphere",
-            primitives=[gltf.Primitive(attributes=attributes, indices=indices, material=material)],
-        )
-    )
-    radii = recording.settings.get("object_radius", {})
-    for o, name in enumerate(recording.objects):
-        radius = float(radii.get(name, OBJECT_RADIUS))
-        node = document.add_node(
-            gltf.Node(
-                name=name,
-                mesh=len(document.root.meshes) - 1,
-                translation=[float(x) for x in recording.object_position[0, o]],
-                scale=[radius] * 3,
-            ),
-            top=True,
-        )
-        document.animate(node, "translation", recording.object_position[:, o], gltf.VEC3)
+    return gltf.Primitive(attributes=attributes, indices=indices, material=material)
 
 
 def _sphere(rings: int = 12, sectors: int = 20) -> tuple[np.ndarray, np.ndarray]:

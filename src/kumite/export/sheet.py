@@ -18,7 +18,10 @@ from kumite.body import BodyMesh, Palette, body_mesh, palette, skin_vertices
 from kumite.clip import Skeleton, facing_frame, forward_kinematics
 from kumite.errors import KumiteError, unknown
 from kumite.kernels.raster import draw_triangles
+from kumite.rotation import from_yaw, rotate
+from kumite.scene.look import car
 from kumite.scene.recording import Recording
+from kumite.scene.stage import SceneObject, recorded_objects
 
 # Where the eye stands: turned from the character's front [rad], raised above the floor [rad].
 VIEWS = {
@@ -36,7 +39,6 @@ FLOOR = np.array([0.84, 0.85, 0.86])
 OBJECT_COLOUR = np.array([0.95, 0.75, 0.15])
 GRID = 0.5  # m
 HAZE_FROM, HAZE_DEPTH = 4.0, 10.0  # m behind the last figure, and how deep at least
-OBJECT_RADIUS = 0.1  # m, where a recording does not say
 
 
 @dataclass(frozen=True)
@@ -214,6 +216,22 @@ def ball(centre: np.ndarray, radius: float, colour: np.ndarray = OBJECT_COLOUR) 
     return Shape(centre + radius * n, n, faces, np.broadcast_to(colour, n.shape).copy())
 
 
+def object_shapes(thing: SceneObject, centre: np.ndarray) -> list[Shape]:
+    """A ball, or of a box a car, with its middle at a place [3] m."""
+    if thing.size is None:
+        return [ball(centre, thing.radius)]
+    turn = from_yaw(thing.yaw)
+    return [
+        Shape(
+            centre + rotate(turn, part.vertices),
+            rotate(turn, part.normals),
+            part.faces,
+            np.tile(part.colour, (len(part.vertices), 1)),
+        )
+        for part in car(thing.size)
+    ]
+
+
 # Sheets ------------------------------------------------------------------------------------------
 
 
@@ -231,14 +249,14 @@ def contact_sheet(
     labels: Sequence[str] | None = None,
     follow: bool = True,
     object_position: np.ndarray | None = None,
-    object_radius: Sequence[float] | None = None,
+    objects: Sequence[SceneObject] = (),
 ) -> None:
     """Draw frames of K characters, roots [F, K, 3] and rotations [F, K, J, 4], to a PNG.
 
     ``view``: 'front', 'three-quarter', 'side' or 'top', as the first character faces in the first
     frame shown; with several characters, as it looks at the second. ``follow`` keeps the characters
     in the middle of each cell; otherwise one camera sees all. ``size``: pixels (w, h) of a cell.
-    ``object_position`` [F, O, 3] and ``object_radius`` [O] (m) are drawn as balls.
+    ``objects`` [O] are drawn where ``object_position`` [F, O, 3] (m) says.
 
     Errors: shapes that do not fit; no frames; frames out of range; an unknown view.
     """
@@ -265,7 +283,10 @@ def contact_sheet(
     if len(looks) < characters:
         raise KumiteError(f"sheet: colours for {len(looks)} of {characters} characters")
     things = np.zeros((count, 0, 3)) if object_position is None else np.asarray(object_position)
-    radii = [OBJECT_RADIUS] * things.shape[1] if object_radius is None else list(object_radius)
+    if things.shape != (count, len(objects), 3):
+        raise KumiteError(
+            f"sheet: object_position {things.shape}; expected [{count}, {len(objects)}, 3]"
+        )
 
     mesh = body_mesh(skeleton)
     cells = []
@@ -275,7 +296,8 @@ def contact_sheet(
         shapes = [
             body_shape(mesh, skeleton, position[k], world[k], looks[k]) for k in range(characters)
         ]
-        shapes += [ball(p, r) for p, r in zip(things[frame], radii)]
+        for thing, centre in zip(objects, things[frame]):
+            shapes += object_shapes(thing, centre)
         cells.append(_labelled(render(camera, shapes), name))
     _save(path, cells, min(columns, len(cells)))
 
@@ -294,7 +316,6 @@ def recording_sheet(
     """Draw frames of a recording (twelve at even distances unless given), labelled in seconds."""
     evenly = np.unique(np.linspace(0, len(recording) - 1, 12).round().astype(int))
     chosen = evenly.tolist() if frames is None else list(frames)
-    radii = recording.settings.get("object_radius", {})
     contact_sheet(
         path,
         recording.skeleton,
@@ -308,7 +329,7 @@ def recording_sheet(
         labels=[f"{f / recording.fps:.2f} s" for f in chosen],
         follow=follow,
         object_position=recording.object_position,
-        object_radius=[float(radii.get(n, OBJECT_RADIUS)) for n in recording.objects],
+        objects=recorded_objects(recording),
     )
 
 

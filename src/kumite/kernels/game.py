@@ -232,32 +232,11 @@ def closeness(weights, p, u, w, yaw):
 
 
 @lean_kernel
-def movement(state, p, moves, want):
-    """f^mov1 of player p at the end of its action (Eq. 4), and f^mov2 (Eq. 9); both are costs."""
-    weights = want.weights
-    time = state[p * FIELDS + END]
-    x, z, yaw = place_at(state, p, time, moves)
-    u, w, _ = place_at(state, 1 - p, time, moves)
-    coop = 0.0
-    if weights[p, PLACE] != 0.0:
-        g = int((time - want.goal_from) / want.goal_every + 0.5)
-        g = min(max(g, 0), want.goal.shape[1] - 1)
-        aside, short = want.goal[p, g, 0] - x, want.goal[p, g, 1] - z
-        coop -= weights[p, PLACE] * (aside * aside + short * short)
-    if weights[p, HEADING] != 0.0:
-        turned = wrapped(yaw - weights[p, PREFERRED_HEADING])
-        coop -= weights[p, HEADING] * turned * turned
-    return closeness(weights, p, u - x, w - z, yaw), coop
-
-
-@lean_kernel
-def among_others(state, p, moves, rules, want):
-    """What others add for player p at the end of its action: it is one against those who are after
-    it, too, their objectives summed with its opponent's (section VIII-B); nobody runs into anybody.
+def among_others(p, x, z, time, rules, want):
+    """What others make of player p's place at a time: it is one against those who are after it,
+    too, their objectives summed with its opponent's (section VIII-B); nobody runs into anybody.
     """
     weights, third = want.weights, want.third
-    time = state[p * FIELDS + END]
-    x, z, _ = place_at(state, p, time, moves)
     g = int((time - want.goal_from) / want.goal_every + 0.5)
     g = min(max(g, 0), third.shape[1] - 1)
     comp = 0.0
@@ -275,6 +254,35 @@ def among_others(state, p, moves, rules, want):
 
 
 @lean_kernel
+def standing(p, x, z, yaw, u, w, time, rules, want):
+    """f^mov1 (Eq. 4) and f^mov2 (Eq. 9) of player p in (x, z, yaw) at a time, the opponent at
+    (u, w); both are costs."""
+    weights = want.weights
+    coop = 0.0
+    if weights[p, PLACE] != 0.0:
+        g = int((time - want.goal_from) / want.goal_every + 0.5)
+        g = min(max(g, 0), want.goal.shape[1] - 1)
+        aside, short = want.goal[p, g, 0] - x, want.goal[p, g, 1] - z
+        coop -= weights[p, PLACE] * (aside * aside + short * short)
+    if weights[p, HEADING] != 0.0:
+        turned = wrapped(yaw - weights[p, PREFERRED_HEADING])
+        coop -= weights[p, HEADING] * turned * turned
+    comp = closeness(weights, p, u - x, w - z, yaw)
+    if want.third.shape[0] > 0:
+        comp += among_others(p, x, z, time, rules, want)
+    return comp, coop
+
+
+@lean_kernel
+def movement(state, p, moves, rules, want):
+    """f^mov1 and f^mov2 of player p at the end of its action."""
+    time = state[p * FIELDS + END]
+    x, z, yaw = place_at(state, p, time, moves)
+    u, w, _ = place_at(state, 1 - p, time, moves)
+    return standing(p, x, z, yaw, u, w, time, rules, want)
+
+
+@lean_kernel
 def edge(state, before, p, moves, rules, want):
     """What it adds in ``state`` that player p has begun a stretch: comp, coop as p sees them.
 
@@ -287,9 +295,7 @@ def edge(state, before, p, moves, rules, want):
     if near:
         given += want.weights[p, GIVEN_SHORT]
         taken += 1.0
-    comp, there = movement(state, p, moves, want)
-    if want.third.shape[0] > 0:
-        comp += among_others(state, p, moves, rules, want)
+    comp, there = movement(state, p, moves, rules, want)
     return comp + given - want.weights[p, TAKEN] * taken, coop + there
 
 
@@ -312,6 +318,8 @@ def choices(game, state, children, before, way, flaws):
     attacked = moves.kind[opposing] == ATTACK and begun + moves.last_tip[opposing] >= time
     landed = state[q * FIELDS + LANDED]
     back = inverse(frame)
+    u, w, _ = place_at(state, q, time, moves)
+    _, coop_here = standing(p, x, z, yaw, u, w, time, rules, want)
     stands = way_of(first, last, frame, moves, rules.stride, way)
     flaws = flaws[: stretches.shape[0]]
     for hasty in (True, False):
@@ -363,11 +371,39 @@ def choices(game, state, children, before, way, flaws):
             comp, coop = edge(states[count], before, p, moves, rules, want)
         comp += weights[p, SUITABILITY] * want.suits[k, opposing]
         action[count], comps[count] = k, sign * comp
-        coops[count] = coop + weights[p, REQUIREMENT] * want.asked[p, k]
+        # Of the way to a check point counts what is gained: few long actions are no better.
+        coops[count] = coop - coop_here + weights[p, REQUIREMENT] * want.asked[p, k]
         if p == 0:
             comps[count] -= want.tired[k]
         count += 1
     return count, stretches.shape[0], p
+
+
+@lean_kernel
+def look_at(game, state, stretches, way, flaws):
+    """Flaws [n] of whoever is next beginning one of stretches [n]; way [m, 5]: room."""
+    moves, rules, _ = parts(game)
+    p = next_player(state)
+    q = 1 - p
+    time = state[p * FIELDS + END]
+    x, z, yaw = place_at(state, p, time, moves)
+    opposing, begun = int(state[q * FIELDS + STRETCH]), state[q * FIELDS + BEGUN]
+    done = min(max(int(time - begun), 0), moves.duration[opposing])
+    first, last = moves.start[opposing] + done, moves.duration[opposing] - done
+    frame = seen_from(state, q, x, z, yaw)
+    attacked = moves.kind[opposing] == ATTACK and begun + moves.last_tip[opposing] >= time
+    stands = way_of(first, last, frame, moves, rules.stride, way)
+    facing = rules.facing[p]
+    judge(stretches, first, last, frame, way, stands, attacked, facing, False, moves, rules, flaws)
+
+
+@kernel
+def flaws_of(game, state, k):
+    """What is wrong with whoever is next beginning stretch k: see :mod:`kumite.kernels.prune`."""
+    flaws = np.zeros(1, dtype=np.int64)
+    room = game.duration.max() // game.stride + 2
+    look_at(game, state, np.array([k]), np.empty((room, 5)), flaws)
+    return flaws[0]
 
 
 @kernel

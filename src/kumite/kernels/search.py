@@ -41,7 +41,7 @@ from kumite.kernels.jit import kernel, lean_kernel, plugged
 SEARCHER, OPPONENT = 0, 1  # who chooses: a max node, a min node
 NO_CHILD = -1
 TASKS = 64  # subtrees to share out: the tree is split at its first level with as many nodes
-WORKERS = 24  # take turns at them: each has large and small ones. Many core counts divide it
+WORKERS = 6  # a core, who take turns at them: each has large and small ones
 
 
 class Children(NamedTuple):
@@ -367,7 +367,8 @@ def make_search(expand: Callable[..., Any], leaves: Callable[..., Any] = no_more
         core.
         """
         # Workers know nothing of each other's bounds; one that starts below the root has them all.
-        enough, workers = (1, 1) if prune else (TASKS, WORKERS)
+        enough = 1 if prune else TASKS
+        workers = 1 if prune or cores == 1 else WORKERS * cores
         top, level, start, stop = begin(game, state, depth, most, enough)
         workers, left = max(min(workers, stop - start), 1), depth - level
         made = np.zeros((workers, left + 1), np.int64)
@@ -382,7 +383,7 @@ def make_search(expand: Callable[..., Any], leaves: Callable[..., Any] = no_more
                 game, nodes, first, stop, workers, left, most, player, prune, made[w], considered[w]
             )
 
-        if workers > 1 and cores > 1:
+        if workers > 1:
             list(threads(cores).map(turn, range(workers)))
         else:
             for w in range(workers):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -45,6 +46,7 @@ from kumite.scene.stage import SceneObject
 from kumite.scene.story import CueSettings, Story
 
 NEAR = 6.0  # m within which others are minded
+FREE = 1.5  # times the distance of a catch: so far one has got away
 GOALS = 25  # places ahead of which a fighter knows: 6 s
 
 
@@ -71,11 +73,13 @@ class BoutScene:
         self.reactions = Reactions(self.tree, len(self.names), self.bout.reactions)
         self.players = [f.player() for f in settings.fighters]
         self.routes = [f.route() for f in settings.fighters]
-        self._kept: dict[int, dict] = {}  # players as they were before a cue changed them
+        self._kept: dict[tuple[int, str], Any] = {}  # of players, what cues have changed
         for name, player, route in zip(self.names, self.players, self.routes):
             check_orders(name, self.tree, player, route)
         for cue in settings.cue:
-            orders = Player(wanted=cue.wanted or (), unwanted=cue.unwanted or ())
+            orders = Player(
+                wanted=cue.wanted or (), unwanted=cue.unwanted or (), only=cue.only or ()
+            )
             check_orders(f"cue of {cue.who}", self.tree, orders, cue.route())
         self.reset(seed)
 
@@ -141,12 +145,13 @@ class BoutScene:
         common = np.flatnonzero(ways >= max(np.quantile(ways[calm], 0.5), 1))
         self.stretch = rng.choice(common, count)
         self._recent = [deque(maxlen=MEMORY) for _ in range(count)]
-        for k, kept in self._kept.items():
-            self.players[k].__dict__.update(kept)
+        for (k, field), kept in self._kept.items():
+            setattr(self.players[k], field, kept)
         self._kept = {}
         self.progress = [None if r is None else Progress(r) for r in self.routes]
         self._done: list[set[str]] = [set() for _ in range(count)]
         self._told = [0] * count
+        self._caught = np.zeros(count, dtype=bool)
         self._landed = [NO_BLOW] * count  # the blow each has landed last in what it is doing
         bout = self.bout
         spread = np.array([bout.scatter, bout.scatter, np.radians(bout.scatter_deg)])
@@ -188,6 +193,8 @@ class BoutScene:
             push_apart(self.floor)
         self.frame += 1
         self._pass_check_points()
+        if self.bout.catch:
+            self._catch()
         if happened:
             for k, s, blow in self.floor.thrown:
                 self._event("strike", k, limb=LIMBS[s], blow=blow)
@@ -246,6 +253,7 @@ class BoutScene:
             pruned=round(decision.pruned, 4),
             jump=bool(cast.jump[k]),
             **({"outside_set": True} if decision.outside else {}),
+            **({"flaws": ", ".join(decision.flaws)} if decision.flaws else {}),
         )
 
     def _turn_to_nearest(self, k: int) -> None:
@@ -281,6 +289,8 @@ class BoutScene:
     def _player(self, k: int) -> Player:
         """A fighter as it plays now: with where it is to be, and what is wanted there."""
         player, progress = self.players[k], self.progress[k]
+        if self._lies(int(self.floor.opponent[k])):  # it is over
+            return replace(player, only=("idle",) if "idle" in self.tree.choices else ())
         if progress is None:
             return player
         return replace(
@@ -336,20 +346,15 @@ class BoutScene:
     def take_cue(self, cue: CueSettings) -> None:
         """Somebody fights otherwise from their next decision on."""
         k = self.names.index(cue.who)
-        player = self.players[k]
-        self._kept.setdefault(k, dict(vars(player)))
         if cue.against is not None:
             self._nearest[k] = cue.against == NEAREST
             if not self._nearest[k]:
                 self.floor.opponent[k] = self.names.index(cue.against)
-        if cue.style is not None:
-            player.style = style(cue.style)
-        if cue.depth is not None:
-            player.depth = cue.depth
-        if cue.wanted is not None:
-            player.wanted = cue.wanted
-        if cue.unwanted is not None:
-            player.unwanted = cue.unwanted
+        for field in ("style", "depth", "wanted", "unwanted", "only"):
+            told = getattr(cue, field)
+            if told is not None:
+                self._kept.setdefault((k, field), getattr(self.players[k], field))
+                setattr(self.players[k], field, style(told) if field == "style" else told)
         route = cue.route()
         if route is not None:
             self.progress[k], self._told[k] = Progress(route), 0
@@ -367,6 +372,18 @@ class BoutScene:
     def drag(self, k: int, way: np.ndarray) -> None:
         """Character k is moved over the ground by way [2] m, feet and all."""
         self.cast.anchor[k, :2] += way
+
+    def _catch(self) -> None:
+        """Tell whom somebody has come so near that it counts; again after it has got away."""
+        place, opponent = self.cast.root_position[:, [0, 2]], self.floor.opponent
+        far = np.linalg.norm(place - place[opponent], axis=1)
+        wants = np.array([p.style.preferred_distance for p in self.players])
+        near = (far < self.bout.catch) & (wants < wants[opponent])
+        for k in np.flatnonzero(near & ~self._caught).tolist():
+            self._event(
+                "caught", k, victim=self.names[opponent[k]], distance=round(float(far[k]), 3)
+            )
+        self._caught = near | (self._caught & (far < FREE * self.bout.catch))
 
     # Check points --------------------------------------------------------------------------------
 

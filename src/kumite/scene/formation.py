@@ -43,12 +43,12 @@ class PairsSettings(Settings):
     count: Annotated[int, Field(ge=1, le=MOST_PAIRS)] = 12
     layout: Literal["spiral", "crossing"] = "spiral"
     spacing: Annotated[Finite, Field(ge=1.5, le=50)] = 3.0  # m between pairs, at least
-    speed: Annotated[Finite, Field(gt=0, le=5)] = 0.2  # m/s of the innermost, or of all
+    speed: Annotated[Finite, Field(gt=0, le=5)] = 0.2  # m/s, at most
     seconds: Annotated[Finite, Field(gt=0, le=3600)] = 30.0
     points: Annotated[int, Field(ge=2, le=200)] = 13
     radius: Positive = 0.7  # m within which a check point is reached
     facing: Literal["rival", "way"] = "rival"
-    turn_deg: Annotated[Finite, Field(ge=-3600, le=3600)] = 40.0  # of a spiral
+    turn_deg: Annotated[Finite, Field(ge=-3600, le=3600)] = 40.0  # of a spiral, at most
     one: MemberSettings
     other: MemberSettings
 
@@ -61,12 +61,14 @@ class PairsSettings(Settings):
         """Places [points, 2] and times [points] of every pair."""
         rings = max(1, round(np.sqrt(self.count / 8.0)))
         arms = -(-self.count // rings)
-        innermost = max(arms * self.spacing / (2.0 * np.pi), 1.0)
+        innermost = max(0.5 * self.spacing / np.sin(np.pi / arms), 1.0) if arms > 1 else 1.0
         share = np.linspace(0.0, 1.0, self.points)
-        turn = np.radians(self.turn_deg)
-        # The innermost pair's way is as long as its speed asks for: it turns, the rest it spreads.
+        # Nobody's way is longer than the speed asks for, and it spreads by 0.6 of that at least.
         length = self.speed * self.seconds
-        grow = np.sqrt(max(length**2 - (innermost * turn) ** 2, (0.3 * length) ** 2))
+        outermost = innermost + (rings - 1) * self.spacing + 0.5 * length
+        turn = np.radians(self.turn_deg)
+        turn = np.sign(turn) * min(abs(turn), 0.8 * length / outermost)
+        grow = np.sqrt(length**2 - (outermost * turn) ** 2)
         out = []
         for k in range(self.count):
             ring, arm = divmod(k, arms)

@@ -71,6 +71,8 @@ def record(
             "library": scene.library.digest,
             "source_skate_m_s": source_skate(scene.library),
             "object_radius": {thing.name: thing.radius for thing in scene.objects},
+            "object_size": {o.name: list(o.size) for o in scene.objects if o.size is not None},
+            "object_yaw": {o.name: o.yaw for o in scene.objects if o.size is not None},
             "aims_at": scene.settings.aims,
             "scene": scene.settings.model_dump(mode="json"),
         },

@@ -183,14 +183,13 @@ class SceneSettings(Settings):
                 self._refuse_stranger(cue.who, cue.against, known)
         routed = {f.name: f.route() for f in self.fighters}
         for moment in (*self.cue, *self.vehicle):
-            if moment.after is None:
-                continue
-            route = routed.get(moment.after)
-            if route is None or not -len(route) <= moment.check_point < len(route):
-                raise ValueError(
-                    f"after {moment.after!r} at check point {moment.check_point}; expected a "
-                    "fighter with that check point"
-                )
+            for name in moment.waits_for:
+                route = routed.get(name)
+                if route is None or not -len(route) <= moment.check_point < len(route):
+                    raise ValueError(
+                        f"after {name!r} at check point {moment.check_point}; expected a fighter "
+                        "with that check point"
+                    )
         return self
 
     @staticmethod

@@ -12,6 +12,8 @@ import numpy as np
 from kumite.clip import Skeleton
 from kumite.scene.recording import Event, Recording
 
+RADIUS = 0.1  # m of an object of which a recording does not say it
+
 
 @dataclass
 class SceneObject:
@@ -23,6 +25,28 @@ class SceneObject:
     draggable: bool = False
     size: tuple[float, float, float] | None = None  # m: width, height and length of a box
     yaw: float = 0.0  # rad, the way a box's length points
+
+
+def recorded_objects(recording: Recording) -> list[SceneObject]:
+    """The objects of a recording, where they are in its first frame."""
+    told = recording.settings
+    radii, sizes = told.get("object_radius", {}), told.get("object_size", {})
+    yaws = told.get("object_yaw", {})
+    return [
+        SceneObject(
+            name,
+            recording.object_position[0, o].astype(np.float64),
+            float(radii.get(name, RADIUS)),
+            size=_size(sizes[name]) if name in sizes else None,
+            yaw=float(yaws.get(name, 0.0)),
+        )
+        for o, name in enumerate(recording.objects)
+    ]
+
+
+def _size(numbers: Sequence[float]) -> tuple[float, float, float]:
+    width, height, length = numbers
+    return float(width), float(height), float(length)
 
 
 class Stage(Protocol):
@@ -82,10 +106,7 @@ class Playback:
         self.skeleton = recording.skeleton
         self.names = recording.names
         self.seed = int(recording.settings.get("seed", 0))
-        radii = recording.settings.get("object_radius", {})
-        self.objects = [
-            SceneObject(n, np.zeros(3), float(radii.get(n, 0.1))) for n in recording.objects
-        ]
+        self.objects = recorded_objects(recording)
         self.load(recording)
 
     def load(self, recording: Recording) -> None:

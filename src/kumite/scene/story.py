@@ -30,11 +30,14 @@ BRAKE = 8.0  # m/s² of a vehicle that has run somebody over
 CLEAR = 0.25  # m kept before a vehicle by the middle of whom it carries away
 
 
+CHANGES = ("against", "style", "depth", "wanted", "unwanted", "only", "point")  # by a cue
+
+
 class Moment(Settings):
-    """When: at a time, or when a fighter has come to a check point."""
+    """When: at a time, or when a fighter, or each of several, has come to a check point."""
 
     at: Annotated[Finite, Field(ge=0)] | None = None  # s
-    after: Name | None = None
+    after: Name | Annotated[tuple[Name, ...], Field(min_length=1)] | None = None
     check_point: int = -1  # of that fighter's route; -1 is the last
 
     @model_validator(mode="after")
@@ -42,6 +45,12 @@ class Moment(Settings):
         if (self.at is None) == (self.after is None):
             raise ValueError('expected "at", a time, or "after", a fighter at a check point')
         return self
+
+    @property
+    def waits_for(self) -> tuple[str, ...]:
+        """The fighters who have to come to that check point."""
+        after = self.after or ()
+        return (after,) if isinstance(after, str) else after
 
 
 class CueSettings(Moment):
@@ -53,6 +62,7 @@ class CueSettings(Moment):
     depth: Depth | None = None
     wanted: tuple[str, ...] | None = None
     unwanted: tuple[str, ...] | None = None
+    only: tuple[str, ...] | None = None
     point: tuple[CheckPointSettings, ...] | None = None  # a new route
 
     def route(self) -> Route | None:
@@ -60,9 +70,8 @@ class CueSettings(Moment):
 
     @model_validator(mode="after")
     def _changes_something(self) -> CueSettings:
-        changes = (self.against, self.style, self.depth, self.wanted, self.unwanted, self.point)
-        if all(c is None for c in changes):
-            raise ValueError("it changes nothing; expected against, style, depth, …")
+        if all(getattr(self, name) is None for name in CHANGES):
+            raise ValueError(f"it changes nothing; expected one of {', '.join(CHANGES)}")
         if self.style is not None:
             Manner(style=self.style)  # raises what is wrong with it
         return self
@@ -134,11 +143,13 @@ class Story:
 def _has_come(moment: Moment, scene: Actors, seconds: float) -> bool:
     if moment.at is not None:
         return seconds >= moment.at
-    assert moment.after is not None
-    progress = scene.progress[scene.names.index(moment.after)]
-    if progress is None:
-        return False
-    index = moment.check_point % len(progress.route)
+    waited_for = (scene.progress[scene.names.index(name)] for name in moment.waits_for)
+    return all(p is not None and _is_at(p, moment.check_point) for p in waited_for)
+
+
+def _is_at(progress: Progress, check_point: int) -> bool:
+    """Whether a check point has been reached, or given up for a later one."""
+    index = check_point % len(progress.route)
     return progress.index > index or (progress.index == index and progress.arrived is not None)
 
 

@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import viser
 
+from kumite.rotation import from_yaw
+from kumite.scene.look import car
 from kumite.scene.stage import SceneObject
 from kumite.studio.palette import RGB, mix
 from kumite.studio.ring import STAGE
@@ -20,7 +22,7 @@ SETTLE_HALFLIFE = 0.4  # s; the handle rests where the object hangs, not where i
 
 
 class Targets:
-    """A sphere for every object, and a gizmo at each one that can be dragged."""
+    """A sphere or car for every object, and a gizmo at each one that can be dragged."""
 
     def __init__(
         self,
@@ -29,14 +31,10 @@ class Targets:
         moved: Callable[[str, np.ndarray], None],
     ) -> None:
         self._objects = tuple(o.name for o in objects)
-        self._spheres = [
-            server.scene.add_icosphere(
-                f"{STAGE}/object/{i}",
-                radius=o.radius,
-                color=TARGET_COLOUR,
-                subdivisions=3,
-                position=o.position,
-            )
+        self._shown = [
+            _add_sphere(server, f"{STAGE}/object/{i}", o)
+            if o.size is None
+            else _add_car(server, f"{STAGE}/object/{i}", o, o.size)
             for i, o in enumerate(objects)
         ]
         self._gizmos: dict[int, viser.TransformControlsHandle] = {}
@@ -84,14 +82,34 @@ class Targets:
     def draw(self, position: np.ndarray, seconds: float) -> None:
         """Put the objects at ``position`` [O, 3] m, ``seconds`` of wall time after the last."""
         left = 0.5 ** (seconds / SETTLE_HALFLIFE)
-        for i, sphere in enumerate(self._spheres):
-            sphere.position = position[i]
-            if self._flash[i] > 0:
+        for i, thing in enumerate(self._shown):
+            thing.position = position[i]
+            if self._flash[i] > 0 and isinstance(thing, viser.IcosphereHandle):
                 self._flash[i] = max(self._flash[i] - seconds, 0.0)
-                sphere.color = mix(TARGET_COLOUR, STRUCK_COLOUR, self._flash[i] / FLASH_SECONDS)
+                thing.color = mix(TARGET_COLOUR, STRUCK_COLOUR, self._flash[i] / FLASH_SECONDS)
             gizmo = self._gizmos.get(i)
             if gizmo is not None and i not in self._held:
                 gizmo.position = position[i] + (np.asarray(gizmo.position) - position[i]) * left
+
+
+def _add_sphere(server: viser.ViserServer, name: str, thing: SceneObject) -> viser.IcosphereHandle:
+    return server.scene.add_icosphere(
+        name, radius=thing.radius, color=TARGET_COLOUR, subdivisions=3, position=thing.position
+    )
+
+
+def _add_car(
+    server: viser.ViserServer, name: str, thing: SceneObject, size: tuple[float, float, float]
+) -> viser.FrameHandle:
+    frame = server.scene.add_frame(
+        name, show_axes=False, position=thing.position, wxyz=from_yaw(thing.yaw)
+    )
+    for part in car(size):
+        r, g, b = (round(255 * c) for c in part.colour)
+        server.scene.add_mesh_simple(
+            f"{name}/{part.name}", part.vertices, part.faces, color=(r, g, b), flat_shading=True
+        )
+    return frame
 
 
 def gizmo_scale(radius: float) -> float:
