@@ -22,35 +22,11 @@ NODES, KEPT, PUT_UP, COUNTS = COMBINATIONS, COMBINATIONS + 1, COMBINATIONS + 2, 
 
 @lean_kernel
 def judged(game, state, way, flaws):
-    """What is wrong with each action that can be done in a state, into flaws; how many there are:
-    what ``expand`` sees before it drops any. way [m, 5]: room."""
-    moves, rules, _ = kernels.parts(game)
+    """Flaws of each action that can be done in a state; how many there are. way [m, 5]: room."""
     p = kernels.next_player(state)
-    o, v = p * kernels.FIELDS, (1 - p) * kernels.FIELDS
-    now = state[o + kernels.END]
-    x, z, yaw = kernels.place_at(state, p, now, moves)
-    here = moves.successor[int(state[o + kernels.STRETCH])]
-    stretches = moves.stretch[moves.action_start[here] : moves.action_start[here + 1]]
-    opposing, begun = int(state[v + kernels.STRETCH]), state[v + kernels.BEGUN]
-    done = min(max(int(now - begun), 0), moves.duration[opposing])
-    first, last = moves.start[opposing] + done, moves.duration[opposing] - done
-    attacked = moves.kind[opposing] == kernels.ATTACK and begun + moves.last_tip[opposing] >= now
-    frame = kernels.seen_from(state, 1 - p, x, z, yaw)
-    stands = prune.way_of(first, last, frame, moves, rules.stride, way)
-    prune.judge(
-        stretches,
-        first,
-        last,
-        frame,
-        way,
-        stands,
-        attacked,
-        rules.facing[p],
-        False,
-        moves,
-        rules,
-        flaws[: stretches.shape[0]],
-    )
+    here = game.successor[int(state[p * kernels.FIELDS + kernels.STRETCH])]
+    stretches = game.stretch[game.action_start[here] : game.action_start[here + 1]]
+    fight.look_at(game, state, stretches, way, flaws[: stretches.shape[0]])
     return stretches.shape[0]
 
 

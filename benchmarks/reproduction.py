@@ -21,7 +21,6 @@ from typing import Any
 
 import numpy as np
 from fights import (
-    ALL_WAYS,
     FIRST_SEED,
     SECONDS,
     Fight,
