@@ -187,20 +187,9 @@ def formation(seeds: int) -> str:
         time_taken = f"{f.wall:.1f}", f"{f.cpu:.1f}", f.decisions
         off = f"{w.middle_off:.2f}", f"{w.middle_late:.2f}", f"{w.apart:.2f}"
         rows.append((job.seed, *time_taken, *off, f"{w.down:.0%}", f"{w.early:.0%}"))
-    return _table(
-        (
-            "seed",
-            "wall s",
-            "CPU s",
-            "decisions",
-            "middle to its path m",
-            "to where it is due m",
-            "closest of different pairs m",
-            "blue lies at the end",
-            "fell too early",
-        ),
-        rows,
-    )
+    header = ("seed", "wall s", "CPU s", "decisions", "middle to its path m", "to its due place m")
+    header += ("closest of different pairs m", "blue lies at the end", "fell too early")
+    return _table(header, rows)
 
 
 # Who does what -----------------------------------------------------------------------------------
@@ -280,22 +269,12 @@ def sword(seeds: int) -> str:
     mean, least = [f.gap.mean() for f in found], [f.gap.min() for f in found]
     near = max(abs(gap - 1.5) for gap in mean)
     rows = [
-        (
-            "blows thrown a minute by each",
-            "all some",
-            _spread(blows, ".1f"),
-            _said(blows.min() > 0),
-        ),
+        ("blows thrown a minute by each", "> 0", _spread(blows, ".1f"), _said(blows.min() > 0)),
         ("blows landed a minute by each", "some", _spread(hits, ".1f"), _said(hits.mean() > 0)),
         ("fighters who land none in 30 s", "", f"{np.mean(hits == 0):.0%}", ""),
         ("mean distance of a fight", "1.5 m within 0.5", f"{_spread(mean)} m", _said(near < 0.5)),
         ("closest in a fight", "> 0.25 m", f"{_spread(least)} m", _said(min(least) > 0.25)),
-        (
-            "facing the other within 45°",
-            "≥ 80 %",
-            f"{_spread(facing, '.0f')} %",
-            _said(facing.min() >= 80),
-        ),
+        ("facing within 45°, %", "≥ 80", _spread(facing, ".0f"), _said(facing.min() >= 80)),
     ]
     return _table(("figure", "wanted", "reached", "met"), rows) + f"\n\n{_runs(seeds)}"
 
