@@ -5,7 +5,7 @@
     python benchmarks/reproduction.py -o docs/reproduction.md  # between the marks of the document
 
 With KUMITE_MOCAP set what boxers do is measured on the real boxer's library, too. Seeds begin at
-100: no settings were chosen with these in view.
+FIRST_SEED: no settings were chosen with these in view.
 """
 
 from __future__ import annotations
