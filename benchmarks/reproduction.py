@@ -143,7 +143,7 @@ def _places(library: str, count: int) -> tuple[BoutScene, list]:
 @_section("time")
 def timings(seeds: int) -> str:
     """One decision by depth; 30 s of a fight."""
-    few = {4: 12, 5: 4} if seeds > 2 else {4: 2, 5: 1}
+    few = {4: 12, 5: 4} if seeds > FEW_SEEDS else {4: 4, 5: 1}
     rows, runs = [], []
     for name in boxers():
         scene, places = _places(name, 24)
@@ -162,7 +162,7 @@ def timings(seeds: int) -> str:
             rate = 1e3 * nodes / sum(wall)
             told = f"{nodes / len(wall):,.0f}", f"{rate:.1e}"
             rows.append((*row, *(f"{m:.3g}" for m in ms), *told))
-        for depth in range(1, 6):
+        for depth in range(1, 6 if seeds > FEW_SEEDS else 5):  # at 5 it takes minutes
             job = Job("boxing", FIRST_SEED, name, depths=(depth, depth))
             _, _, f = _best(partial(play, job), 3 if depth < 4 else 1)
             per = f"{f.nodes / f.decisions:,.0f}"
