@@ -162,7 +162,7 @@ def project(point: np.ndarray, camera: viser.CameraHandle, page: Page) -> tuple[
 def drag(page: Page, start: tuple[float, float], end: tuple[float, float], steps: int = 8) -> None:
     """Press at ``start``, move to ``end`` and let go; px on the page."""
     page.mouse.move(*start)
-    page.wait_for_timeout(250)  # a gizmo takes the pointer only after a frame with it on the handle
+    page.wait_for_timeout(700)  # a gizmo takes the pointer only after a frame with it on the handle
     page.mouse.down()
     for i in range(1, steps + 1):
         t = i / steps
