@@ -154,6 +154,19 @@ def test_a_pair_follows_check_points_and_says_what_it_missed(actions: Library):
     assert missed.character == "blue" and missed.data["due"] == 5.0 and missed.data["by"] > 20.0
 
 
+def test_each_check_point_that_is_missed_is_told_though_one_before_it_was_reached_late(
+    actions: Library,
+):
+    late = [{"place": (0.0, 0.0), "time": 0.5, "radius": 20.0, "require": ["attack"]}]
+    far = [{"place": (40.0, 0.0), "time": t} for t in (6.0, 8.0)]
+    scene = _fight(actions, red={"point": late + far, "depth": 1})
+    _run(scene, 9.0)
+    told = [e.data["point"] for e in scene.events if e.kind == "missed"]
+    assert told == [0, 1, 2]
+    (reached,) = [e for e in scene.events if e.kind == "check point"]
+    assert reached.data["point"] == 0 and reached.data["late_by"] > 0
+
+
 def test_wrong_fights_are_refused(actions: Library, library: Library):
     with pytest.raises(KumiteError, match="one of frames; expected one of whole actions"):
         BoutScene(load_scene("boxing"), library)

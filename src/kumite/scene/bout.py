@@ -16,6 +16,7 @@ from kumite.body import ARMS
 from kumite.clip import LIMBS
 from kumite.control import Progress, Route, style
 from kumite.control.game_tree import (
+    CALM,
     GOAL_EVERY,
     MEMORY,
     NOBODY_ELSE,
@@ -138,9 +139,8 @@ class BoutScene:
         table = self.library.table
         number = {name: k for k, name in enumerate(self.names)}
         self.floor.opponent[:] = [number.get(f.against, NOBODY) for f in self.settings.fighters]
-
         # Everyone starts where idling or moving about has ended, with many ways out.
-        calm = np.isin(self.tree.kinds, ("transition", "idle"))
+        calm = np.isin(self.tree.kinds, CALM)
         ways = np.diff(table.action_start)[table.target] * calm
         common = np.flatnonzero(ways >= max(np.quantile(ways[calm], 0.5), 1))
         self.stretch = rng.choice(common, count)
@@ -150,7 +150,7 @@ class BoutScene:
         self._kept = {}
         self.progress = [None if r is None else Progress(r) for r in self.routes]
         self._done: list[set[str]] = [set() for _ in range(count)]
-        self._told = [0] * count
+        self._told = [0] * count  # check points before this one have been told if missed
         self._caught = np.zeros(count, dtype=bool)
         self._landed = [NO_BLOW] * count  # the blow each has landed last in what it is doing
         bout = self.bout
@@ -268,7 +268,6 @@ class BoutScene:
         """Who else is near character k and its opponent, as the tree is told of them."""
         place = self.cast.root_position[:, [0, 2]]
         near = np.linalg.norm(place - place[k], axis=1) < NEAR
-        near[[k, o]] = False
         near |= np.isin(self.floor.opponent, [k, o])  # after one of the two, wherever they are
         near[[k, o]] = False
         who = np.flatnonzero(near)
@@ -403,11 +402,12 @@ class BoutScene:
                     late_by=round(float(reached.late_by or 0.0), 3),
                     distance=round(float(reached.distance), 3),
                 )
-            missed = progress.missed(seconds)
-            for m in missed[self._told[k] :]:
+            for m in progress.missed(seconds):
+                if m.index < self._told[k]:
+                    continue
                 due = None if m.due is None else round(float(m.due), 3)
                 self._event("missed", k, point=m.index, due=due, by=round(float(m.distance), 3))
-            self._told[k] = max(self._told[k], len(missed))
+                self._told[k] = m.index + 1
 
     def _event(self, kind: str, k: int, **data) -> None:
         self.events.append(Event(self.frame, kind, self.names[k], data))
