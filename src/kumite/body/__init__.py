@@ -4,6 +4,7 @@ from kumite.body.apart import Apart, keep_out
 from kumite.body.mesh import ROLES, BodyMesh, body_mesh, skin_vertices
 from kumite.body.palette import PALETTES, Palette, palette
 from kumite.body.segments import ARMS, PARTS, Body, lay_body
+from kumite.body.spheres import Spheres, lay_spheres, load_spheres, save_spheres
 
 __all__ = [
     "ARMS",
@@ -13,10 +14,14 @@ __all__ = [
     "Apart",
     "Body",
     "BodyMesh",
+    "Spheres",
     "Palette",
     "body_mesh",
     "keep_out",
     "lay_body",
+    "lay_spheres",
+    "load_spheres",
     "palette",
+    "save_spheres",
     "skin_vertices",
 ]

@@ -1,0 +1,169 @@
+"""Attacks as space-time volumes: spheres at times (Oshita & Masaoka 2011, section 4.2).
+
+A ball, a limb of whoever moves, a sword: each becomes the same. How densely it is sampled follows
+from how fast it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from kumite.clip import freeze
+from kumite.errors import KumiteError
+from kumite.kernels.avoid import Attacks
+
+INTERVAL = 1 / 20  # s between samples at most, the paper's
+LONGEST_STEP = 0.10  # m that an attack goes between two samples at most
+FASTEST = 400.0  # m/s: faster is no attack but a mistake
+SMALLEST, LARGEST = 0.005, 2.0  # m, radii
+NEAR = 2.0  # m from a character's root over the ground: only there an attack counts
+GRAVITY = 9.81  # m/s²
+
+
+@dataclass(frozen=True)
+class Attack:
+    """I spheres at T times; between them they move in straight lines."""
+
+    when: np.ndarray  # [T] s, ascending, of the scene's clock
+    centre: np.ndarray  # [T, I, 3] m
+    radius: np.ndarray  # [I] m
+    name: str = "attack"
+
+    def __post_init__(self) -> None:
+        times, spheres = len(self.when), len(self.radius)
+        freeze(
+            self,
+            f"attack {self.name!r}",
+            when=(np.float64, (times,)),
+            centre=(np.float64, (times, spheres, 3)),
+            radius=(np.float64, (spheres,)),
+        )
+        for what, fits in (
+            ("expected at least one time and one sphere", times > 0 and spheres > 0),
+            ("times must ascend", bool(np.all(np.diff(self.when) > 0))),
+            ("it is not finite", bool(np.isfinite(self.when).all() and np.isfinite(self.centre).all())),
+            (
+                f"radii must be from {SMALLEST} to {LARGEST} m",
+                bool(np.all((self.radius >= SMALLEST) & (self.radius <= LARGEST))),
+            ),
+        ):
+            if not fits:
+                raise KumiteError(f"attack {self.name!r}: {what}")
+        if self.speed > FASTEST:
+            raise KumiteError(
+                f"attack {self.name!r}: {self.speed:.0f} m/s; expected at most {FASTEST:g}"
+            )
+
+    def __len__(self) -> int:
+        return len(self.when)
+
+    @property
+    def speed(self) -> float:
+        """The largest of its spheres' speeds [m/s]."""
+        if len(self.when) < 2:
+            return 0.0
+        way = np.linalg.norm(np.diff(self.centre, axis=0), axis=2)
+        return float((way / np.diff(self.when)[:, None]).max())
+
+    def at(self, when: np.ndarray | float) -> np.ndarray:
+        """Centres [..., I, 3] at times, at its ends before and after them."""
+        t = np.clip(when, self.when[0], self.when[-1])
+        k = np.clip(np.searchsorted(self.when, t, side="right") - 1, 0, max(len(self) - 2, 0))
+        if len(self) == 1:
+            return np.broadcast_to(self.centre[0], (*np.shape(t), *self.centre.shape[1:]))
+        share = ((t - self.when[k]) / (self.when[k + 1] - self.when[k]))[..., None, None]
+        return self.centre[k] + share * (self.centre[k + 1] - self.centre[k])
+
+    @cached_property
+    def dense(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Times [T'] so near to each other that no sphere goes farther than it may between two,
+        what time each stands for [T'], centres [T', I, 3].
+        """
+        if len(self) < 2:
+            return self.when, np.zeros(1), self.centre
+        way = np.linalg.norm(np.diff(self.centre, axis=0), axis=2).max(axis=1)
+        parts = np.ceil(np.maximum(way / LONGEST_STEP, np.diff(self.when) / INTERVAL) - 1e-9)
+        parts = np.maximum(parts, 1).astype(int)
+        of = np.repeat(np.arange(len(parts)), parts)
+        part = np.arange(len(of)) - np.repeat(np.cumsum(parts) - parts, parts)
+        when = np.append(self.when[of] + part / parts[of] * np.diff(self.when)[of], self.when[-1])
+        return when, np.gradient(when), self.at(when)
+
+
+def thrown(
+    position: Sequence[float] | np.ndarray,
+    velocity: Sequence[float] | np.ndarray,
+    radius: float,
+    *,
+    when: float = 0.0,
+    seconds: float = 4.0,
+    gravity: float = GRAVITY,
+    name: str = "ball",
+) -> Attack:
+    """A ball in flight from a place with a velocity, until it lands or ``seconds`` have passed.
+
+    Errors: not finite, a radius or speed that makes no sense.
+    """
+    p, v = np.array(position, dtype=float), np.array(velocity, dtype=float)
+    if p.shape != (3,) or v.shape != (3,) or not (np.isfinite(p).all() and np.isfinite(v).all()):
+        raise KumiteError(f"attack {name!r}: expected a finite place and velocity of 3 numbers")
+    if not (np.isfinite(seconds) and seconds > 0 and np.isfinite(gravity) and np.isfinite(when)):
+        raise KumiteError(f"attack {name!r}: expected finite times above 0 and gravity")
+    if not SMALLEST <= radius <= LARGEST:
+        raise KumiteError(
+            f"attack {name!r}: radius {radius} m; expected from {SMALLEST} to {LARGEST}"
+        )
+    speed = float(np.linalg.norm(v))
+    if not 0 < speed <= FASTEST:
+        raise KumiteError(f"attack {name!r}: {speed:g} m/s; expected above 0, at most {FASTEST:g}")
+    end = seconds
+    if gravity > 0:  # it lies where it has come down
+        drop = v[1] ** 2 + 2.0 * gravity * max(p[1] - radius, 0.0)
+        end = min(end, (v[1] + np.sqrt(drop)) / gravity)
+    end = max(end, 1e-3)
+    fastest = max(speed, float(np.linalg.norm(v - [0.0, gravity * end, 0.0])))
+    count = int(np.ceil(max(end / INTERVAL, fastest * end / LONGEST_STEP))) + 1
+    t = np.linspace(0.0, end, count)
+    centre = p + t[:, None] * v
+    centre[:, 1] -= 0.5 * gravity * t**2
+    return Attack(when + t, centre[:, None], np.array([radius]), name)
+
+
+def packed(
+    attacks: Sequence[Attack], now: float, place: np.ndarray, within: float = NEAR
+) -> tuple[Attacks, list[int]]:
+    """Attacks as the kernels take them, and which these are: of each what is still to come, times
+    from ``now`` on, from the first sample that is near a place [x, z] to the last.
+
+    An attack that comes by twice is one attack. Those that never come by are left out.
+    """
+    taken, which = [], []
+    for m, attack in enumerate(attacks):
+        when, lasts, centre = attack.dense
+        first = int(np.searchsorted(when, now))
+        off = centre[first:, :, ::2] - place
+        close = np.flatnonzero(
+            (np.hypot(off[..., 0], off[..., 1]) < within + attack.radius).any(axis=1)
+        )
+        if len(close):
+            part = slice(first + close[0], first + close[-1] + 1)
+            taken.append((when[part] - now, lasts[part], centre[part], attack.radius))
+            which.append(m)
+    if len(taken) == 1:
+        when, lasts, centre, radius = taken[0]
+        sample = np.array([0, len(when)])
+        return Attacks(sample, when, lasts, centre, radius[None], np.array([len(radius)])), which
+    most = max((len(t[3]) for t in taken), default=1)
+    sample = np.cumsum([0, *(len(t[0]) for t in taken)])
+    centre, radius = np.zeros((sample[-1], most, 3)), np.zeros((len(taken), most))
+    for m, t in enumerate(taken):
+        centre[sample[m] : sample[m + 1], : len(t[3])] = t[2]
+        radius[m, : len(t[3])] = t[3]
+    when = np.concatenate([np.zeros(0), *(t[0] for t in taken)])
+    lasts = np.concatenate([np.zeros(0), *(t[1] for t in taken)])
+    count = np.array([len(t[3]) for t in taken], dtype=np.int64)
+    return Attacks(sample, when, lasts, centre, radius, count), which

@@ -1,0 +1,390 @@
+"""Avoidance with the least movement, in time (Oshita & Masaoka 2011).
+
+Given what attacks and where the character is in its present edge, find the path of the motion graph
+whose avoidance part falls on the attack: not hit, out of its way just before, no farther away than
+need be, its speed adjusted as little as can be.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from kumite.body import Spheres, lay_spheres
+from kumite.clip import SIDES, ClipSet
+from kumite.control.attack import Attack, packed
+from kumite.errors import KumiteError
+from kumite.graph import Library
+from kumite.kernels import avoid as kernels
+from kumite.kernels import cells, paths
+from kumite.rotation import planar_compose, planar_inverse
+
+NONE = -1
+END_EFFECTORS = tuple(f"{side}_{part}" for part in ("hand", "foot") for side in SIDES)
+GROUP = 8  # spheres that are looked at together, or not at all
+MOST_PATHS = 50_000  # candidates of one search; more are counted, not weighed
+
+
+@dataclass(frozen=True)
+class AvoidanceSettings:
+    """The paper's numbers, by its names in the comments, and ours."""
+
+    window: float = 1.0  # s, T_window: how far the avoidance may be from the attack as captured
+    weights: tuple[float, float, float] = (1.0, 1.0, 1.0)  # w_a, w_b, w_t
+    enough: float = 0.5  # m s, E_avoidance
+    far: float = 1.0  # m, D_body, which the paper does not give
+    most: float = 4.0  # E_time
+    fast: float = 0.3  # m/s, V_fast: faster edges may be slowed down
+    slow: float = 0.1  # m/s, V_slow: slower edges may be sped up
+    still: float = 0.0  # m/s, V_still: even slower ones either way
+    clearance: float = 0.02  # m between attack and body, the paper's 0
+    left: float = 0.05  # m by which a part of the body must have moved to have left its place
+    ramp: float = 0.2  # s in which a change of speed comes and goes
+    wide: float = 0.10  # m at which an attack passes by and nothing is done about it
+    horizon: float = 1.5  # s to which the index looks ahead
+    index: bool = True
+    culling: bool = True
+
+    def __post_init__(self) -> None:
+        for name in ("window", "enough", "far", "horizon"):
+            if not 0 < getattr(self, name) < 100:
+                raise KumiteError(f"avoidance: {name} {getattr(self, name)}; expected above 0")
+        for name in ("clearance", "left", "ramp", "wide", "fast", "slow", "still"):
+            if not 0 <= getattr(self, name) < 100:
+                raise KumiteError(f"avoidance: {name} {getattr(self, name)}; expected at least 0")
+        if len(self.weights) != 3 or min(self.weights) < 0 or not np.isfinite(self.weights).all():
+            raise KumiteError("avoidance: weights: expected three numbers, none below 0")
+        if not 1 <= self.most <= 16:
+            raise KumiteError(f"avoidance: most {self.most}; expected from 1 to 16")
+
+
+class Outcome:
+    """What a search can come to, as the log says it."""
+
+    FOUND = "found"
+    WIDE = "wide"  # it passes by
+    LATE = "too late"  # it is over, or reaches the body before anything can be done
+    NO_CANDIDATE = "no candidate"  # no path has an avoidance in time
+    HIT = "hit"  # every candidate would be hit, or could not be timed
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Where a character is: in a stretch of the table, or at rest in a state."""
+
+    anchor: np.ndarray  # [3] library world → scene
+    phase: float  # library frame shown, with its fraction
+    stop: int  # library frame at which the present edge ends
+    stretch: int = NONE  # the present edge, NONE before any
+    slowness: float = 1.0  # s of play for 1 s of capture, now
+
+
+@dataclass(frozen=True)
+class Avoidance:
+    """What a search came to."""
+
+    outcome: str
+    path: tuple[int, ...] = ()  # stretches after the present edge; the last one avoids
+    part: int = NONE  # which part of the library's
+    aim: float = np.nan  # s from now to the attack's middle
+    scale: float = 1.0  # s_time of Eq. 3, by which adjustable edges are slowed
+    cost: float = np.nan  # e (Eq. 10) …
+    costs: tuple[float, float, float] = (np.nan, np.nan, np.nan)  # … of avoidance, body, time scale
+    distance: float = np.nan  # m, d: the smallest to the attack
+    before: float = np.nan  # m, d₀: had the body stayed
+    overlap: float = 0.0  # m s, e': how much of the attack goes through where the body was
+    indexed: bool = False  # whether the index knew it
+    counts: tuple[int, ...] = ()  # candidates by what became of them, as kernels.avoid numbers it
+    at: np.ndarray = field(default_factory=lambda: np.zeros(0))  # [n] frames from now …
+    when: np.ndarray = field(default_factory=lambda: np.zeros(0))  # [n] … and s when they show
+
+    @property
+    def candidates(self) -> int:
+        return sum(self.counts)
+
+
+class _Room(NamedTuple):
+    """Arrays that a search works in."""
+
+    scratch: kernels.Scratch
+    node: np.ndarray
+    way: np.ndarray
+    gone: np.ndarray
+    path: np.ndarray
+    length: np.ndarray
+    part: np.ndarray
+    outcome: np.ndarray
+    scores: np.ndarray
+    turn: np.ndarray
+    seen: np.ndarray
+    seen_path: np.ndarray
+    found: np.ndarray
+
+
+class AvoidanceSearch:
+    """Everything about a library that avoidance needs. Its searches may run in any thread."""
+
+    def __init__(
+        self,
+        library: Library,
+        settings: AvoidanceSettings | None = None,
+        *,
+        spheres: Spheres | None = None,
+    ) -> None:
+        """spheres: the body's volume; by default laid to cover it. Errors: no part to avoid with."""
+        self.library, self.settings = library, settings or AvoidanceSettings()
+        clips = library.clips
+        self.spheres = spheres or lay_spheres(clips.skeleton)
+        self.volumes = _volumes(clips, self.spheres)
+        parts = library.avoidance
+        part_of, which = parts_of_stretches(library)
+        if len(which) == 0:
+            raise KumiteError(
+                "the library has no avoidance parts in its graph: nobody in it can avoid anything; "
+                "expected clips of ducking, leaning or stepping aside (kumite segment shows what "
+                "was found, and lets it be marked by hand)"
+            )
+        table, s = library.table, self.settings
+        speed = fastest_end_effector(library)
+        begins, ends = parts.start[which], parts.stop[which] - 1
+        self.which = which  # [A] part of the library for each part of an edge
+        middle = 0.5 * (begins + ends)
+        soonest = np.empty(table.states)
+        paths.soonest(
+            table.action_start, table.stretch, table.first, table.last, table.target,
+            part_of, middle, soonest,
+        )  # fmt: skip
+        still = speed < s.still
+        self.graph = kernels.Graph(
+            table.action_start,
+            table.stretch,
+            table.first,
+            table.last,
+            table.target,
+            table.displacement,
+            clips.facing,
+            part_of,
+            begins,
+            ends,
+            (speed > s.fast) | still,
+            ((speed < s.slow) & (speed > s.still)) | still,
+            soonest,
+            float(clips.fps),
+        )
+        self.weighing = kernels.Weighing(
+            np.array(s.weights), s.enough, s.far, s.most, s.clearance, s.left, s.ramp,
+            float(self.spheres.radius.max()),
+        )
+        self._local = threading.local()
+
+    @cached_property
+    def masks(self) -> kernels.Masks:
+        """Section 5.2's, for attacks of at least 10 cm."""
+        count = len(self.graph.begins) if self.settings.culling else 0
+        root = self.library.clips.root_position[self.graph.begins[:count]]
+        half = 0.5 * cells.PIXELS * cells.PIXEL
+        origin = np.stack([root[:, 0] - half, np.zeros(count), root[:, 2] - half], axis=1)
+        bits = np.zeros((count, cells.SLICES, cells.PIXELS), dtype=np.uint64)
+        least = 0.10
+        cells.draw_masks(
+            self.volumes.centre, self.volumes.radius, self.graph.begins[:count],
+            self.graph.ends[:count], least, origin, bits,
+        )  # fmt: skip
+        return kernels.Masks(bits, origin, cells.PIXEL, cells.SLICE, least)
+
+    @cached_property
+    def index(self) -> cells.Index:
+        """Section 5.1's grids of all states."""
+        return _build_index(self)
+
+    @property
+    def index_bytes(self) -> int:
+        return sum(array.nbytes for array in self.index)
+
+    def search(
+        self, standing: Standing, attacks: Sequence[Attack], now: float, *, main: int = 0
+    ) -> Avoidance:
+        """How to avoid an attack, ``attacks[main]``, and not to be hit by the others meanwhile.
+
+        now: the scene's time [s] at which the character is where ``standing`` says.
+        """
+        place = planar_compose(standing.anchor, self.library.clips.facing[int(standing.phase)])[:2]
+        attack = attacks[main]
+        if attack.when[-1] <= now:
+            return Avoidance(Outcome.LATE)
+        order = [main, *(m for m in range(len(attacks)) if m != main)]
+        given, which = packed([attacks[m] for m in order], now, place)
+        if which[:1] != [0]:
+            return Avoidance(Outcome.WIDE)
+        room, s = self._room(), self.settings
+        present = kernels.Now(
+            np.asarray(standing.anchor, dtype=float),
+            float(standing.phase),
+            int(standing.stop),
+            int(standing.stretch),
+            float(standing.slowness),
+        )
+        gaps = np.empty(len(given.when))
+        paths.foresee(0, present, self.graph, self.volumes, given, room.scratch, gaps)
+        gaps, when = gaps[: given.sample[1]], given.when[: given.sample[1]]
+        if gaps[0] < 0 and when[0] <= 0.0:
+            return Avoidance(Outcome.LATE)
+        if gaps.min() > s.wide:
+            return Avoidance(Outcome.WIDE, distance=float(gaps.min()))
+        by = np.flatnonzero(gaps <= max(gaps.min(), 0.0) + s.wide)
+        aim = 0.5 * float(when[by[0]] + when[by[-1]])
+        state = self.state_at(present.stop)
+        facing = planar_compose(standing.anchor, self.library.clips.facing[present.stop])
+        reach = aim + 0.5 * s.window - (present.stop - present.phase) / self.graph.fps
+        count, best, _, indexed = paths.find(
+            state, facing, 0, aim, s.window, s.index and reach <= s.horizon, self._stamp(),
+            present, self.graph, self.volumes, given, self.weighing, self.masks, self.index, room,
+        )  # fmt: skip
+        kept = min(count, MOST_PATHS)
+        counts = tuple(np.bincount(room.outcome[:kept], minlength=kernels.OUTCOMES).tolist())
+        if best < 0:
+            outcome = Outcome.HIT if count else Outcome.NO_CANDIDATE
+            return Avoidance(outcome, aim=aim, counts=counts)
+        path, part = room.path[best, : room.length[best]].copy(), int(room.part[best])
+        e, *costs, overlap, distance, before, scale = room.scores[best].tolist()
+        frames = paths.timing(
+            path, len(path), part, aim, present, self.graph, self.weighing, room.scratch
+        )
+        return Avoidance(
+            Outcome.FOUND, tuple(path.tolist()), int(self.which[part]), aim, scale, e,
+            (costs[0], costs[1], costs[2]), distance, before, overlap, indexed, counts,
+            room.scratch.at[:frames].copy(), room.scratch.when[:frames].copy(),
+        )  # fmt: skip
+
+    def state_at(self, frame: int) -> int:
+        """The state that an edge ending at a library frame leads to, or NONE."""
+        states = self.library.table.state_frame
+        n = int(np.searchsorted(states, frame))
+        return n if n < len(states) and states[n] == frame else NONE
+
+    def _stamp(self) -> int:
+        self._local.stamp = getattr(self._local, "stamp", 0) + 1
+        return self._local.stamp
+
+    def _room(self) -> _Room:
+        if not hasattr(self._local, "room"):
+            spheres, edges = len(self.spheres), kernels.DEPTH + 1
+            groups = len(self.volumes.group) - 1
+            frames = kernels.MOST_FRAMES
+            self._local.room = _Room(
+                kernels.Scratch(
+                    np.zeros((edges, 4)), np.zeros(edges), np.zeros(edges, dtype=bool),
+                    np.zeros(frames), np.zeros(frames), np.zeros(frames),
+                    np.zeros(0, dtype=np.int32),
+                    *(np.zeros(shape) for _ in range(3) for shape in ((3, spheres), (4, groups))),
+                ),
+                np.zeros(kernels.DEPTH, dtype=np.int64),
+                np.zeros(kernels.DEPTH, dtype=np.int64),
+                np.zeros(kernels.DEPTH),
+                np.zeros((MOST_PATHS, kernels.DEPTH), dtype=np.int32),
+                np.zeros(MOST_PATHS, dtype=np.int32),
+                np.zeros(MOST_PATHS, dtype=np.int32),
+                np.zeros(MOST_PATHS, dtype=np.int32),
+                np.zeros((MOST_PATHS, 8)),
+                np.zeros(4),
+                np.zeros(cells.ACROSS * cells.ACROSS * cells.HIGH, dtype=np.int64),
+                np.zeros(MOST_PATHS, dtype=bool),
+                np.zeros(4096, dtype=np.int64),
+            )  # fmt: skip
+        return self._local.room
+
+
+def _volumes(clips: ClipSet, spheres: Spheres) -> kernels.Volumes:
+    """Spheres of all frames, and spheres around groups of neighbours."""
+    centre, radius = spheres.of_frames(clips), spheres.radius.astype(np.float32)
+    group = np.unique(np.append(np.arange(0, len(spheres), GROUP), len(spheres)))
+    bound = np.zeros((len(clips), 4, len(group) - 1), dtype=np.float32)
+    for g, (low, high) in enumerate(zip(group[:-1], group[1:])):
+        some = centre[:, :, low:high]
+        middle = some.mean(axis=2, dtype=np.float64)
+        reach = np.linalg.norm(some - middle[:, :, None], axis=1) + radius[low:high]
+        bound[:, :3, g], bound[:, 3, g] = middle, reach.max(axis=1) + 1e-5  # float32's rounding
+    return kernels.Volumes(centre, radius, group, bound)
+
+
+def parts_of_stretches(library: Library) -> tuple[np.ndarray, np.ndarray]:
+    """Avoidance parts in CSR by stretch, [L + 1] and [A]: those that a stretch plays whole."""
+    parts, table = library.avoidance, library.table
+    low = np.searchsorted(parts.start, table.first - 1)
+    high = np.searchsorted(parts.stop, table.last + 1, side="right")
+    counts = np.maximum(high - low, 0)
+    part_of = np.concatenate([[0], np.cumsum(counts)])
+    which = np.arange(part_of[-1]) - np.repeat(part_of[:-1], counts) + np.repeat(low, counts)
+    return part_of, which.astype(np.int64)
+
+
+def fastest_end_effector(library: Library) -> np.ndarray:
+    """The largest speed [L] m/s of hands and feet in each stretch."""
+    clips, table = library.clips, library.table
+    position, _ = clips.world
+    joints = [clips.skeleton.joint(role) for role in END_EFFECTORS]
+    speed = np.linalg.norm(np.diff(position[:, joints], axis=0), axis=2).max(axis=1) * clips.fps
+    # speed[f] is from frame f to f + 1: a stretch moves from first - 1 to last
+    starts = np.stack([table.first - 1, table.last], axis=1).ravel()
+    return np.maximum.reduceat(np.append(speed, 0.0), starts)[::2]
+
+
+def _build_index(search: AvoidanceSearch) -> cells.Index:
+    graph, s, room = search.graph, search.settings, search._room()
+    horizon = s.horizon * graph.fps
+    size = np.zeros(len(room.seen), dtype=np.int64)
+    seen = np.zeros_like(size)
+    moves = np.zeros((len(graph.begins), len(search.spheres)), dtype=bool)
+    centre = search.volumes.centre
+    cells.spheres_that_leave(centre, graph.begins, graph.ends, s.left - 1e-4, moves)
+    states = search.library.table.state_frame
+    rows: list[tuple[np.ndarray, ...]] = []
+    stamp = 1
+    key, of = np.zeros(1 << 16, dtype=np.int32), np.zeros(1 << 16, dtype=np.int32)
+    for state, frame in enumerate(states.tolist()):
+        count = paths.enumerate_paths(
+            state, 0.0, -1.0, horizon, graph, room.node, room.way, room.gone, room.path,
+            room.length, room.part,
+        )  # fmt: skip
+        if count > MOST_PATHS:
+            raise KumiteError(
+                f"avoidance: {count} paths lead to an avoidance within {s.horizon} s of a state; "
+                f"expected at most {MOST_PATHS} (a shorter horizon, or fewer transitions)"
+            )
+        now = kernels.Now(
+            planar_inverse(search.library.clips.facing[frame]), float(frame), frame, NONE, 1.0
+        )
+        while True:
+            entries = cells.enter(
+                count, room.path, room.length, room.part, now, graph, search.volumes, moves,
+                room.scratch, stamp, seen, size, key, of,
+            )  # fmt: skip
+            stamp += count + 1
+            if entries <= len(key):
+                break
+            size[:] = 0
+            key, of = np.zeros(2 * entries, dtype=np.int32), np.zeros(2 * entries, dtype=np.int32)
+        cell = np.zeros(min(entries, len(size)), dtype=np.int32)
+        entry_of, entry = np.zeros(len(cell), dtype=np.int64), np.zeros(entries, dtype=np.int32)
+        used = cells.gather(entries, key, of, size, cell, entry_of, entry)
+        path, length = room.path[:count].copy(), room.length[:count].copy()
+        middle = paths.middles(count, path, length, room.part, now, graph)
+        rows.append((path, length, room.part[:count].copy(), middle, cell[:used], entry_of[:used], entry))
+    per = [np.array([0, *np.cumsum([len(r[k]) for r in rows])]) for k in (1, 4, 6)]
+    starts = np.concatenate([r[5] + begin for r, begin in zip(rows, per[2])])
+    return cells.Index(
+        per[0],
+        np.concatenate([r[0] for r in rows]),
+        np.concatenate([r[1] for r in rows]),
+        np.concatenate([r[2] for r in rows]),
+        np.concatenate([r[3] for r in rows]),
+        per[1],
+        np.concatenate([r[4] for r in rows]),
+        np.append(starts, per[2][-1]),
+        np.concatenate([r[6] for r in rows]),
+    )

@@ -1,0 +1,171 @@
+"""Transitions from which an avoidance is soon reached, wherever a character is.
+
+Oshita & Masaoka (2011, section 6) find that in a standard motion graph few avoidances can be
+reached in time, and leave a better one to others. Here every way out of the capture is a chance to
+avoid: at short intervals, a few of the avoidance motions that differ most are offered, each entered
+where its beginning fits best. Apart from these, captures go on as they are, with now and then a
+way into another, so that paths that only rest or walk do not multiply.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kumite.annotate import AvoidanceParts
+from kumite.clip import ClipSet
+from kumite.errors import KumiteError
+from kumite.graph.distance import PoseFeatures, pose_features
+from kumite.graph.transitions import Transitions
+from kumite.kernels import distance as kernels
+from kumite.rotation import planar_apply, planar_inverse
+
+EVERY = 0.20  # s between the frames from which an avoidance may be begun
+LEAD = 0.40  # s before a part in which it is entered
+CHANGE_EVERY = 1.2  # s between the frames from which another capture may be gone on with
+OFFERED = 16  # avoidances at such a frame, at most: as many as the paper's library has
+ELSEWHERE = 2  # other ways at a frame of change
+WORST = 1.0  # rad: poses farther apart are not joined …
+FEWEST = 2  # … but every frame keeps its best so many ways into an avoidance
+UNLIKE = 0.10  # m, root mean square: avoidances nearer to each other than that are alike
+ROLES = ("head", "chest", "pelvis", "left_hand", "right_hand", "left_foot", "right_foot")
+_SPARE = 8  # rows that the kernel may write beyond the last
+
+
+def find_avoiding_transitions(
+    clips: ClipSet,
+    parts: AvoidanceParts,
+    *,
+    every: float = EVERY,
+    offered: int = OFFERED,
+    worst: float = WORST,
+    features: PoseFeatures | None = None,
+) -> Transitions:
+    """Transitions into avoidances from everywhere, and between captures now and then.
+
+    every [s], offered: how often and how many; worst [rad]: see above. No transition leaves or
+    enters within a part. Errors: no parts, numbers out of range.
+    """
+    if len(parts) == 0:
+        raise KumiteError("no avoidance parts; expected clips in which somebody avoids something")
+    if not 0.02 <= every <= 10 or offered < 1 or not 0 < worst < np.inf:
+        raise KumiteError(
+            f"every {every} s, {offered} offered, worst {worst} rad; expected 0.02 to 10 s, at "
+            "least 1 and more than 0"
+        )
+    features = features or pose_features(clips)
+    fps, clip = clips.fps, clips.clip_of_frame
+    inside = _inside(len(clips), parts)
+    step, change = max(1, round(every * fps)), round(CHANGE_EVERY * fps)
+    since = np.arange(len(clips)) - clips.clip_start[clip]
+    ends = np.zeros(len(clips), dtype=bool)
+    ends[clips.clip_start[1:] - 1] = True
+    # Whoever has begun to avoid goes through with it: else paths that begin again and again, and
+    # never do, would be most of all.
+    entry, part_of_entry = _entries(clips, parts, inside, round(LEAD * fps))
+    begun = inside.copy()
+    begun[entry[entry < parts.start[part_of_entry]]] = True
+    may_leave = ~begun & (since > 0)
+    leaving = np.flatnonzero(may_leave & ((since % step == 0) | ends | _lasts(parts, len(clips))))
+    changing = np.flatnonzero(may_leave & ((since % change == 0) | ends))
+    # From i the capture goes on with j where i is like j - 1; a part's own frames go on anyway.
+    d = _between(features, leaving, entry - 1)
+    own = (entry[None] > leaving[:, None]) & (entry[None] - leaving[:, None] <= step)
+    d[own & (clip[leaving][:, None] == clip[entry][None])] = np.inf
+    order = np.argsort(part_of_entry, kind="stable")
+    first = np.searchsorted(part_of_entry[order], np.arange(len(parts)))
+    best = np.minimum.reduceat(d[:, order], first, axis=1)  # [S, P]
+    unlike = _signatures(clips, parts)
+    source, target, cost = [], [], []
+    for row, i in enumerate(leaving):
+        for p in _choose(best[row], unlike, offered, worst):
+            mine = order[first[p] : first[p + 1] if p + 1 < len(parts) else None]
+            j = mine[np.argmin(d[row, mine])]
+            source.append(i), target.append(entry[j]), cost.append(d[row, j])
+    # Other captures: frames to go on from that lie in no part, a second apart from each other.
+    onward = np.flatnonzero(may_leave & ~ends & (since % step == 0))
+    d = _between(features, changing, onward)
+    near = np.abs(changing[:, None] - onward[None]) < fps
+    d[near & (clip[changing][:, None] == clip[onward][None])] = np.inf
+    for row, i in enumerate(changing):
+        left = ELSEWHERE
+        for j in np.argsort(d[row], kind="stable")[: 16 * ELSEWHERE].tolist():
+            enough = left < ELSEWHERE and d[row, j] > worst
+            if left == 0 or not np.isfinite(d[row, j]) or enough:
+                break
+            taken = [t for s, t in zip(source[-ELSEWHERE:], target[-ELSEWHERE:]) if s == i]
+            if any(abs(t - onward[j]) < fps for t in taken):
+                continue
+            source.append(i), target.append(onward[j] + 1), cost.append(d[row, j])
+            left -= 1
+    pairs, keep = np.unique(np.stack([source, target], axis=1), axis=0, return_index=True)
+    costs = np.array(cost, dtype=np.float32)[keep]
+    return Transitions(
+        pairs[:, 0].astype(np.int32),
+        pairs[:, 1].astype(np.int32),
+        costs,
+        float(worst),
+        len(leaving) * len(entry),
+    )
+
+
+def _inside(frames: int, parts: AvoidanceParts) -> np.ndarray:
+    """Frames [F] after which the part they are in goes on."""
+    edges = np.zeros(frames + 1, dtype=np.int64)
+    np.add.at(edges, parts.start, 1)
+    np.add.at(edges, parts.stop - 1, -1)
+    return np.cumsum(edges[:-1]) > 0
+
+
+def _lasts(parts: AvoidanceParts, frames: int) -> np.ndarray:
+    out = np.zeros(frames, dtype=bool)
+    out[parts.stop - 1] = True
+    return out
+
+
+def _entries(
+    clips: ClipSet, parts: AvoidanceParts, inside: np.ndarray, lead: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Frames at which parts may be entered, up to ``lead`` before each begins, and whose."""
+    entry, whose = [], []
+    for p, start in enumerate(parts.start.tolist()):
+        border = int(clips.clip_start[clips.clip_of_frame[start]])
+        for j in range(start, max(start - lead, border + 1) - 1, -1):
+            if j - 1 < border or inside[j - 1]:
+                break
+            entry.append(j)
+            whose.append(p)
+    return np.array(entry, dtype=np.int64), np.array(whose, dtype=np.int64)
+
+
+def _between(features: PoseFeatures, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Root of D [R, C] float32 rad between frames."""
+    frames = np.concatenate([rows, columns])
+    out = np.empty((len(rows) + _SPARE, len(frames)), dtype=np.float32)
+    of = features.take(frames)
+    kernels.distance_rows(of.quaternion, of.weight, of.euclidean, 0, len(rows), out)
+    return np.sqrt(np.maximum(out[: len(rows), len(rows) :], 0.0))
+
+
+def _signatures(clips: ClipSet, parts: AvoidanceParts) -> np.ndarray:
+    """Where each part takes the body: [P, R * 3] m from its beginning to its middle."""
+    position, _ = clips.world
+    joints = [clips.skeleton.joint(role) for role in ROLES]
+    middle = (parts.start + parts.stop) // 2
+    frame = planar_inverse(clips.facing[parts.start])[:, None]
+    moved = [planar_apply(frame, position[f][:, joints]) for f in (middle, parts.start)]
+    return (moved[0] - moved[1]).reshape(len(parts), -1)
+
+
+def _choose(cost: np.ndarray, signature: np.ndarray, most: int, worst: float) -> list[int]:
+    """Parts to offer: those that join best, of parts that are alike only the best."""
+    chosen: list[int] = []
+    for p in np.argsort(cost, kind="stable").tolist():
+        if len(chosen) == most or not np.isfinite(cost[p]):
+            break
+        if cost[p] > worst and len(chosen) >= FEWEST:
+            break
+        off = signature[chosen] - signature[p]
+        if np.any(np.mean(off**2, axis=1) * 3.0 < UNLIKE**2):
+            continue
+        chosen.append(p)
+    return chosen
