@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -27,6 +27,7 @@ from kumite.rotation import planar_compose, planar_inverse
 NONE = -1
 END_EFFECTORS = tuple(f"{side}_{part}" for part in ("hand", "foot") for side in SIDES)
 GROUP = 8  # spheres that are looked at together, or not at all
+MOST_OTHERS = 32  # next best paths that are told
 MOST_PATHS = 50_000  # candidates of one search; more are counted, not weighed
 
 
@@ -46,12 +47,13 @@ class AvoidanceSettings:
     left: float = 0.05  # m by which a part of the body must have moved to have left its place
     ramp: float = 0.2  # s in which a change of speed comes and goes
     wide: float = 0.10  # m at which an attack passes by and nothing is done about it
+    ahead: float = 2.0  # s before an attack's middle from which avoiding it is thought about
     horizon: float = 1.5  # s to which the index looks ahead
     index: bool = True
     culling: bool = True
 
     def __post_init__(self) -> None:
-        for name in ("window", "enough", "far", "horizon"):
+        for name in ("window", "enough", "far", "ahead", "horizon"):
             if not 0 < getattr(self, name) < 100:
                 raise KumiteError(f"avoidance: {name} {getattr(self, name)}; expected above 0")
         for name in ("clearance", "left", "ramp", "wide", "fast", "slow", "still"):
@@ -68,6 +70,7 @@ class Outcome:
 
     FOUND = "found"
     WIDE = "wide"  # it passes by
+    EARLY = "early"  # it comes later than is thought ahead
     LATE = "too late"  # it is over, or reaches the body before anything can be done
     NO_CANDIDATE = "no candidate"  # no path has an avoidance in time
     HIT = "hit"  # every candidate would be hit, or could not be timed
@@ -82,6 +85,25 @@ class Standing:
     stop: int  # library frame at which the present edge ends
     stretch: int = NONE  # the present edge, NONE before any
     slowness: float = 1.0  # s of play for 1 s of capture, now
+
+
+@dataclass(frozen=True)
+class Plan:
+    """When which frame of a path is shown."""
+
+    path: tuple[int, ...]  # stretches after the present edge
+    part: int  # as searches number it
+    begins: float  # s, of the scene's clock
+    at: np.ndarray  # [n] library frames since it began …
+    when: np.ndarray  # [n] … and the s at which they show
+
+    def frames(self, now: float) -> float:
+        """Library frames that have gone by at a time; 1 a frame once it is over."""
+        return float(np.interp(now - self.begins, self.when, self.at))
+
+    @property
+    def ends(self) -> float:
+        return self.begins + float(self.when[-1])
 
 
 @dataclass(frozen=True)
@@ -100,8 +122,8 @@ class Avoidance:
     overlap: float = 0.0  # m s, e': how much of the attack goes through where the body was
     indexed: bool = False  # whether the index knew it
     counts: tuple[int, ...] = ()  # candidates by what became of them, as kernels.avoid numbers it
-    at: np.ndarray = field(default_factory=lambda: np.zeros(0))  # [n] frames from now …
-    when: np.ndarray = field(default_factory=lambda: np.zeros(0))  # [n] … and s when they show
+    plan: Plan | None = None
+    others: tuple[tuple[tuple[int, ...], int], ...] = ()  # the next best paths and their parts
 
     @property
     def candidates(self) -> int:
@@ -222,13 +244,7 @@ class AvoidanceSearch:
         if which[:1] != [0]:
             return Avoidance(Outcome.WIDE)
         room, s = self._room(), self.settings
-        present = kernels.Now(
-            np.asarray(standing.anchor, dtype=float),
-            float(standing.phase),
-            int(standing.stop),
-            int(standing.stretch),
-            float(standing.slowness),
-        )
+        present = _now(standing)
         gaps = np.empty(len(given.when))
         paths.foresee(0, present, self.graph, self.volumes, given, room.scratch, gaps)
         gaps, when = gaps[: given.sample[1]], given.when[: given.sample[1]]
@@ -238,6 +254,8 @@ class AvoidanceSearch:
             return Avoidance(Outcome.WIDE, distance=float(gaps.min()))
         by = np.flatnonzero(gaps <= max(gaps.min(), 0.0) + s.wide)
         aim = 0.5 * float(when[by[0]] + when[by[-1]])
+        if aim > s.ahead:
+            return Avoidance(Outcome.EARLY, aim=aim)
         state = self.state_at(present.stop)
         facing = planar_compose(standing.anchor, self.library.clips.facing[present.stop])
         reach = aim + 0.5 * s.window - (present.stop - present.phase) / self.graph.fps
@@ -250,16 +268,36 @@ class AvoidanceSearch:
         if best < 0:
             outcome = Outcome.HIT if count else Outcome.NO_CANDIDATE
             return Avoidance(outcome, aim=aim, counts=counts)
-        path, part = room.path[best, : room.length[best]].copy(), int(room.part[best])
+        valid = np.flatnonzero(room.outcome[:kept] == kernels.VALID)
+        leaves = room.scores[valid, 4] > 0.0
+        ranked = valid[np.lexsort((valid, room.scores[valid, 0], ~leaves))][: 1 + MOST_OTHERS]
+        found = [
+            (tuple(room.path[c, : room.length[c]].tolist()), int(room.part[c]))
+            for c in ranked.tolist()
+        ]
+        path, part = found[0]
         e, *costs, overlap, distance, before, scale = room.scores[best].tolist()
-        frames = paths.timing(
-            path, len(path), part, aim, present, self.graph, self.weighing, room.scratch
-        )
+        plan = self.timed(standing, path, part, now + aim, now)
         return Avoidance(
-            Outcome.FOUND, tuple(path.tolist()), int(self.which[part]), aim, scale, e,
+            Outcome.FOUND, path, int(self.which[part]), aim, scale, e,
             (costs[0], costs[1], costs[2]), distance, before, overlap, indexed, counts,
-            room.scratch.at[:frames].copy(), room.scratch.when[:frames].copy(),
+            plan, tuple(found[1:]),
         )  # fmt: skip
+
+    def timed(
+        self, standing: Standing, path: Sequence[int], part: int, aim: float, now: float
+    ) -> Plan:
+        """The plan of playing a path so that the middle of its part falls on ``aim`` [s], as near
+        as it can.
+        """
+        room = self._room()
+        edges = np.array(path, dtype=np.int32)
+        frames = paths.timing(
+            edges, len(edges), part, aim - now, _now(standing), self.graph, self.weighing,
+            room.scratch,
+        )  # fmt: skip
+        at, when = room.scratch.at[:frames].copy(), room.scratch.when[:frames].copy()
+        return Plan(tuple(path), part, now, at, when)
 
     def state_at(self, frame: int) -> int:
         """The state that an edge ending at a library frame leads to, or NONE."""
@@ -297,6 +335,16 @@ class AvoidanceSearch:
                 np.zeros(4096, dtype=np.int64),
             )  # fmt: skip
         return self._local.room
+
+
+def _now(standing: Standing) -> kernels.Now:
+    return kernels.Now(
+        np.asarray(standing.anchor, dtype=float),
+        float(standing.phase),
+        int(standing.stop),
+        int(standing.stretch),
+        float(standing.slowness),
+    )
 
 
 def _volumes(clips: ClipSet, spheres: Spheres) -> kernels.Volumes:
@@ -343,6 +391,7 @@ def _build_index(search: AvoidanceSearch) -> cells.Index:
     centre = search.volumes.centre
     cells.spheres_that_leave(centre, graph.begins, graph.ends, s.left - 1e-4, moves)
     states = search.library.table.state_frame
+    box = np.zeros((len(states), 2, 3))
     rows: list[tuple[np.ndarray, ...]] = []
     stamp = 1
     key, of = np.zeros(1 << 16, dtype=np.int32), np.zeros(1 << 16, dtype=np.int32)
@@ -359,10 +408,11 @@ def _build_index(search: AvoidanceSearch) -> cells.Index:
         now = kernels.Now(
             planar_inverse(search.library.clips.facing[frame]), float(frame), frame, NONE, 1.0
         )
+        box[state] = [[np.inf] * 3, [-np.inf] * 3]
         while True:
             entries = cells.enter(
                 count, room.path, room.length, room.part, now, graph, search.volumes, moves,
-                room.scratch, stamp, seen, size, key, of,
+                room.scratch, stamp, seen, size, key, of, box[state],
             )  # fmt: skip
             stamp += count + 1
             if entries <= len(key):
@@ -377,9 +427,11 @@ def _build_index(search: AvoidanceSearch) -> cells.Index:
         rows.append((path, length, room.part[:count].copy(), middle, cell[:used], entry_of[:used], entry))
     per = [np.array([0, *np.cumsum([len(r[k]) for r in rows])]) for k in (1, 4, 6)]
     starts = np.concatenate([r[5] + begin for r, begin in zip(rows, per[2])])
+    edges = int(max((r[1].max() for r in rows if len(r[1])), default=1))
     return cells.Index(
         per[0],
-        np.concatenate([r[0] for r in rows]),
+        box,
+        np.concatenate([r[0][:, :edges] for r in rows]),
         np.concatenate([r[1] for r in rows]),
         np.concatenate([r[2] for r in rows]),
         np.concatenate([r[3] for r in rows]),

@@ -298,6 +298,7 @@ def time_path(path, count, part, aim, scale, now, graph, weighing, scratch):
         whole = middle(path, count, part, now, graph)
         want = aim * graph.fps
         scale = solve(scratch.at, scratch.weight, frames, whole, want, ramp, now.slowness)
+        scale = max(scale, 0.5 / weighing.most)  # the dropped, too, are timed without standing still
     phase_times(
         scratch.at, scratch.weight, frames, scale, ramp, now.slowness, graph.fps, scratch.when
     )

@@ -29,7 +29,8 @@ class Index(NamedTuple):
     """P paths of all states and E entries of their cells, both by state."""
 
     path_of: np.ndarray  # [N + 1]
-    path: np.ndarray  # [P, D] int32
+    box: np.ndarray  # [N, 2, 3] m, from where to where the body leaves cells, in the state's frame
+    path: np.ndarray  # [P, D'] int32, of as many edges as there are at most
     length: np.ndarray  # [P] int32
     part: np.ndarray  # [P] int32
     middle: np.ndarray  # [P] float32 frames from the state to the middle of the part
@@ -82,12 +83,13 @@ def cells_of(x, y, z, r, seen, stamp, out):
 
 @kernel
 def enter(
-    count, path, length, part, now, graph, volumes, moves, scratch, stamp, seen, size, key, of
+    count, path, length, part, now, graph, volumes, moves, scratch, stamp, seen, size, key, of, box
 ):  # fmt: skip
     """Cells that ``count`` paths of one state leave: keys and numbers of paths, into key and of.
 
     A sphere of the body counts in the cell that its middle is in, and an attack looks so much
-    farther: far fewer entries than cells that are touched, and the same paths or a few more. moves [A, B] bool: spheres that leave their place in a part. size [cells] counts entries. Returns
+    farther: far fewer entries than cells that are touched, and the same paths or a few more. moves [A, B] bool: spheres that leave their place in a part. size [cells] counts
+    entries, box [2, 3] grows around middles. Returns
     how many there are; if more than there is room for, the rest is only counted.
     """
     n, room = 0, key.shape[0]
@@ -100,6 +102,9 @@ def enter(
         for j in range(scratch.still.shape[1]):
             if not moves[p, j]:
                 continue
+            for axis in range(3):
+                box[0, axis] = min(box[0, axis], scratch.still[axis, j])
+                box[1, axis] = max(box[1, axis], scratch.still[axis, j])
             x, y, z = scratch.still[0, j], scratch.still[1, j], scratch.still[2, j]
             key_here = cell_of(x, y, z)
             if seen[key_here] == stamp + c:
@@ -145,14 +150,18 @@ def look_up(
     total = index.path_of[state + 1] - first
     for p in range(total):
         seen_path[p] = False
-    begin, end = index.cell_of[state], index.cell_of[state + 1]
+    begin, end, box = index.cell_of[state], index.cell_of[state + 1], index.box[state]
     for n in range(attacks.sample[main], attacks.sample[main + 1]):
         for i in range(attacks.count[main]):
             a, b = attacks.centre[n, i, 0] - turn[0], attacks.centre[n, i, 2] - turn[1]
             x, z = turn[2] * a - turn[3] * b, turn[3] * a + turn[2] * b
-            more = cells_of(
-                x, attacks.centre[n, i, 1], z, attacks.radius[main, i] + widest, seen, stamp, found
-            )
+            y, r = attacks.centre[n, i, 1], attacks.radius[main, i] + widest + MARGIN
+            if (
+                x + r < box[0, 0] or y + r < box[0, 1] or z + r < box[0, 2]
+                or x - r > box[1, 0] or y - r > box[1, 1] or z - r > box[1, 2]
+            ):  # fmt: skip
+                continue
+            more = cells_of(x, y, z, r - MARGIN, seen, stamp, found)
             for m in range(more):
                 lower, upper = begin, end
                 while lower < upper:

@@ -137,8 +137,12 @@ def find(
 
 @kernel
 def timing(path, count, part, aim, now, graph, weighing, scratch):
-    """A path's frames and times, into scratch.at and scratch.when. Returns how many."""
+    """A path's frames and times, into scratch.at and scratch.when. Returns how many.
+
+    What cannot be timed is played as it was captured, or with the farthest scale allowed.
+    """
     scale, _ = time_scale(path, count, part, aim, now, graph, scratch)
+    scale = min(max(scale, 1.0 / weighing.most), weighing.most)
     lay(path, count, now, graph, scratch)
     frames, _ = time_path(path, count, part, aim, scale, now, graph, weighing, scratch)
     return frames

@@ -14,6 +14,8 @@ from pydantic import Field, model_validator
 
 from kumite import toml
 from kumite.errors import KumiteError
+from kumite.scene.balls import BallsSettings
+from kumite.scene.dodge import DodgerSettings, DodgeSettings, DodgersSettings
 from kumite.scene.fighters import (
     FARTHEST,
     NEAREST,
@@ -129,6 +131,15 @@ class SceneSettings(Settings):
     cue: tuple[CueSettings, ...] = ()  # what changes while they fight
     vehicle: tuple[VehicleSettings, ...] = ()
     object: tuple[ObjectSettings, ...] = ()
+    dodger: tuple[DodgerSettings, ...] = ()  # who avoid what is thrown at them
+    dodgers: DodgersSettings | None = None  # and many more of them
+    dodge: DodgeSettings | None = None  # how they search
+    balls: BallsSettings | None = None  # and what is thrown
+
+    @cached_property
+    def dodging(self) -> tuple[DodgerSettings, ...]:
+        """Those who avoid: named one by one, then those in rows."""
+        return self.dodger + (self.dodgers.dodgers() if self.dodgers else ())
 
     @cached_property
     def characters(self) -> tuple[CharacterSettings, ...]:
@@ -142,6 +153,12 @@ class SceneSettings(Settings):
 
     @model_validator(mode="after")
     def _names_fit(self) -> SceneSettings:
+        if self.dodging:
+            if self.character or self.crowd or self.fighter or self.pairs or self.object:
+                raise ValueError("[[dodger]]s are among themselves; expected nobody else")
+            return self._fit_dodgers()
+        if self.dodge or self.balls:
+            raise ValueError("[dodge] and [balls] are of [[dodger]]s; there are none")
         if self.fighter or self.pairs:
             if self.character or self.crowd or self.object:
                 raise ValueError("[[fighter]]s fight among themselves; expected nobody else")
@@ -165,6 +182,15 @@ class SceneSettings(Settings):
                 raise ValueError(
                     f"{c.name} aims at {c.aims_at!r}; expected another name of the scene ({others})"
                 )
+        return self
+
+    def _fit_dodgers(self) -> SceneSettings:
+        for part in ("bout", "cue", "vehicle"):
+            if getattr(self, part):
+                raise ValueError(f"[{part}] is of [[fighter]]s; there are none")
+        twice = sorted(n for n, times in Counter(self.names).items() if times > 1)
+        if twice:
+            raise ValueError(f"names used twice: {', '.join(twice)}")
         return self
 
     def _fit_fighters(self) -> SceneSettings:
@@ -203,7 +229,7 @@ class SceneSettings(Settings):
     @property
     def names(self) -> tuple[str, ...]:
         """Of all that move by themselves."""
-        return tuple(c.name for c in (*self.characters, *self.fighters))
+        return tuple(c.name for c in (*self.characters, *self.fighters, *self.dodging))
 
     @property
     def aims(self) -> dict[str, str]:
@@ -217,12 +243,13 @@ def with_count(settings: SceneSettings, count: int) -> SceneSettings:
 
     Errors: it has neither; a number too small or too large.
     """
-    part = "crowd" if settings.crowd is not None else "pairs"
+    parts = [p for p in ("crowd", "pairs", "dodgers") if getattr(settings, p) is not None]
+    part = parts[0] if parts else "crowd"
     of = getattr(settings, part)
     if of is None:
         raise KumiteError(
             f"count: {settings.title!r} names its characters one by one; expected a scene with a "
-            "[crowd] or [pairs]"
+            "[crowd], [pairs] or [dodgers]"
         )
     least = 2 if part == "crowd" else 1
     if count < least:

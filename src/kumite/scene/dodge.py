@@ -1,0 +1,205 @@
+"""A scene in which people avoid what is thrown at them (Oshita & Masaoka 2011)."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from kumite.body import lay_body
+from kumite.control.avoidance import AvoidanceSearch, AvoidanceSettings
+from kumite.errors import KumiteError
+from kumite.graph import Library
+from kumite.scene.balls import Balls, BallsSettings, aimed, capsules_of, velocity_to
+from kumite.scene.dodgers import Dodgers
+from kumite.scene.fighters import Finite, Metres, Name, Settings
+from kumite.scene.memory import refuse_too_many
+from kumite.scene.recording import Event
+from kumite.scene.stage import SceneObject
+
+AIM_SPREAD = 0.03  # m by which throws miss the middle of what they are aimed at
+RECOIL = 0.01  # m that a struck segment gives way per m/s of the ball
+
+
+class DodgerSettings(Settings):
+    """Somebody who avoids."""
+
+    name: Name
+    position: tuple[Metres, Metres]  # m, x and z
+    yaw_deg: Finite = 0.0  # 0 faces +Z
+
+
+class DodgersSettings(Settings):
+    """Many of them, in rows."""
+
+    count: Annotated[int, Field(ge=1, le=10_000)] = 9
+    spacing: Annotated[Finite, Field(ge=1.0, le=50.0)] = 4.0  # m
+
+    def dodgers(self) -> tuple[DodgerSettings, ...]:
+        across = max(1, round(self.count**0.5))
+        rows = -(-self.count // across)
+        return tuple(
+            DodgerSettings(
+                name=f"dodger {n + 1}",
+                position=(
+                    self.spacing * (n % across - 0.5 * (across - 1)),
+                    -self.spacing * (n // across - 0.5 * (rows - 1)),
+                ),
+            )
+            for n in range(self.count)
+        )
+
+
+class DodgeSettings(Settings):
+    """How they search; names as in :class:`~kumite.control.avoidance.AvoidanceSettings`."""
+
+    library: Literal["avoidance", "boxing"] = "avoidance"  # of the built-in performer
+    window: Annotated[Finite, Field(gt=0, le=10)] = 1.0  # s
+    avoidance: Annotated[Finite, Field(ge=0)] = 1.0  # weights
+    body: Annotated[Finite, Field(ge=0)] = 1.0
+    timescale: Annotated[Finite, Field(ge=0)] = 1.0
+    clearance: Annotated[Finite, Field(ge=0, le=1)] = 0.04  # m
+    most: Annotated[Finite, Field(ge=1, le=16)] = 4.0
+    latency: Annotated[int, Field(ge=1, le=120)] = 1  # frames until a search is taken up
+    index: bool = True
+    culling: bool = True
+
+    def search(self) -> AvoidanceSettings:
+        return AvoidanceSettings(
+            window=self.window,
+            weights=(self.avoidance, self.body, self.timescale),
+            clearance=self.clearance,
+            most=self.most,
+            index=self.index,
+            culling=self.culling,
+        )
+
+
+class DodgeScene:
+    """Dodgers under fire, one frame at a step. The same seed gives the same frames.
+
+    Follows the :class:`~kumite.scene.stage.Stage` protocol, so the studio can show it.
+    """
+
+    def __init__(self, settings, library: Library, *, seed: int = 0) -> None:
+        """Errors: nobody in it; a library without avoidance parts; too many characters."""
+        if not settings.dodging:
+            raise KumiteError(f"{settings.title!r} has nobody who avoids; expected [[dodger]]s")
+        self.settings, self.library, self.title = settings, library, settings.title
+        self.fps, self.skeleton = library.clips.fps, library.clips.skeleton
+        refuse_too_many(len(settings.dodging), len(self.skeleton))
+        self.names = tuple(d.name for d in settings.dodging)
+        self.dodge = settings.dodge or DodgeSettings()
+        self.balls_settings = settings.balls or BallsSettings()
+        self.search = AvoidanceSearch(library, self.dodge.search())
+        _ = self.search.masks, self.search.index  # made now, not at the first throw
+        self.body = lay_body(self.skeleton)
+        self.reset(seed)
+
+    def reset(self, seed: int) -> None:
+        """Start again from the beginning, with a seed."""
+        self.seed = int(seed)
+        self.frame = 0
+        self.events: list[Event] = []
+        homes = np.array([[*d.position, np.radians(d.yaw_deg)] for d in self.settings.dodging])
+        rng = np.random.default_rng(self.seed)
+        self.dodgers = Dodgers(self.search, homes, rng, self._event, latency=self.dodge.latency)
+        # What is thrown does not depend on how it is avoided: searches can be compared.
+        self._thrower, self._by_seed = np.random.default_rng([self.seed, 1]), 0
+        self.balls = Balls(self.balls_settings, self.body, self.fps)
+        self._number: dict[int, tuple[int, int]] = {}  # ball -> number of the throw, whom at
+        self._capsules = self._pose()
+
+    @property
+    def cast(self):
+        return self.dodgers.cast
+
+    @property
+    def root_position(self) -> np.ndarray:
+        return self.cast.root_position
+
+    @property
+    def wxyz(self) -> np.ndarray:
+        return self.cast.wxyz
+
+    @property
+    def objects(self) -> list[SceneObject]:
+        return self.balls.objects
+
+    def move_object(self, name: str, position: np.ndarray) -> None:
+        """Balls are thrown, not carried."""
+
+    def throw(self, position: np.ndarray, goal: np.ndarray, speed: float, at: int = 0) -> None:
+        """Throw a ball from a place [3] so that it comes by a goal [3]; speed [m/s] is the mean.
+
+        at: the dodger who is to mind it. Errors: a throw that makes no sense.
+        """
+        gravity = self.balls_settings.gravity
+        velocity = velocity_to(np.asarray(position, float), np.asarray(goal, float), speed, gravity)
+        self._throw(np.asarray(position, dtype=float), velocity, at)
+
+    def _throw(self, position: np.ndarray, velocity: np.ndarray, at: int) -> None:
+        n = self.balls.throw(position, velocity, self.frame / self.fps)
+        number = self.balls.thrown
+        if n in self._number:
+            self._over(n)
+        attack = self.balls.attack[n]
+        assert attack is not None
+        self._number[n] = (number, at)
+        self._event(
+            "throw", at, attack=number, ball=self.balls.objects[n].name,
+            speed=round(float(np.linalg.norm(velocity)), 3),
+            place=[round(float(x), 4) for x in position],
+        )  # fmt: skip
+        for k in range(len(self.names)):
+            if k == at or self._comes_near(attack, k):
+                self.dodgers.menace(k, attack, number)
+
+    def _comes_near(self, attack, k: int) -> bool:
+        off = attack.centre[:, 0, [0, 2]] - self.root_position[k, [0, 2]]
+        return bool(np.any(np.hypot(off[:, 0], off[:, 1]) < 2.0))
+
+    def step(self) -> bool:
+        """One frame: throws that are due, searches and edges, balls and what they meet."""
+        s, now = self.balls_settings, self.frame / self.fps
+        while self._by_seed < s.throws and now >= s.first + self._by_seed * s.every - 1e-9:
+            self._throw_at_someone()
+        self.dodgers.step(self.frame)
+        before, self._capsules = self._capsules, self._pose()
+        self.frame += 1
+        hits = self.balls.step(self.root_position, np.stack([before, self._capsules]))
+        for n, k, part, velocity in hits:
+            number, at = self._number[n]
+            self._event(
+                "struck", k, attack=number, part=self.body.parts[part], meant=at == k,
+                speed=round(float(np.linalg.norm(velocity)), 3),
+            )  # fmt: skip
+            self.dodgers.forget(number)
+            joint, place = int(self.body.joint[part]), self.balls.position[n]
+            self.cast.strike(k, joint, place, RECOIL * velocity)
+            del self._number[n]
+        for n in [n for n in self._number if self.balls.attack[n] is None]:
+            self._over(n)
+        return True
+
+    def _over(self, n: int) -> None:
+        """A ball has come down without having met anybody."""
+        number, at = self._number.pop(n)
+        self._event("avoided", at, attack=number)
+        self.dodgers.forget(number)
+
+    def _throw_at_someone(self) -> None:
+        rng, cast = self._thrower, self.cast
+        at = int(rng.integers(len(self.names)))
+        spheres = self.search.spheres
+        goal = spheres.at(cast.position[at], cast.world_wxyz[at])[rng.integers(len(spheres))]
+        goal = goal + rng.normal(0.0, AIM_SPREAD, 3)
+        self._throw(*aimed(rng, self.balls_settings, cast.facing[at], goal), at)
+        self._by_seed += 1
+
+    def _pose(self) -> np.ndarray:
+        return capsules_of(self.body, self.cast.position, self.cast.world_wxyz)
+
+    def _event(self, kind: str, k: int, **data) -> None:
+        self.events.append(Event(self.frame, kind, self.names[k], data))

@@ -1,0 +1,267 @@
+"""Those who avoid: they stand or move about, see what comes, and get out of its way.
+
+The search runs in the background (Oshita & Masaoka 2011, section 6): what it finds is taken up a
+fixed number of frames later, so that a scene shows the same whether a machine is fast or slow. The
+present edge goes on meanwhile; if it ends, another is begun, and paths without that are dropped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from kumite.control.attack import Attack
+from kumite.control.avoidance import Avoidance, AvoidanceSearch, Outcome, Plan, Standing
+from kumite.rotation import planar_compose, wrap_angle
+from kumite.synthesis import Cast
+
+LATENCY = 1  # frames after which what a search has found is taken up
+SOONEST = 4.0  # s before its end from which an attack is minded
+FEW = 3  # of the best ways to go on that are drawn from
+HOME = 0.5  # rad for each metre away from home
+TOO_FAR = 0.6  # m from home that is not minded
+
+_POOL: list[ThreadPoolExecutor] = []
+
+
+def _background() -> ThreadPoolExecutor:
+    """One thread for all scenes: kernels in it run beside those of the picture."""
+    if not _POOL:
+        _POOL.append(ThreadPoolExecutor(1, "avoidance"))
+    return _POOL[0]
+
+
+@dataclass
+class Menace:
+    """An attack as one of those who avoid sees it."""
+
+    attack: Attack
+    number: int
+    told: set[str] = field(default_factory=set)  # outcomes that have been told
+    tried: int = -1  # in which of its victim's edges avoiding it was last thought about
+    covered: bool = False  # by the plan that is being followed
+    settled: bool = False  # nothing more is to be done about it
+
+
+@dataclass
+class Mind:
+    """What one of them is up to."""
+
+    home: np.ndarray  # [3] facing frame that it comes back to
+    stretch: int
+    edges: int = 0  # begun so far
+    menaces: list[Menace] = field(default_factory=list)
+    plan: Plan | None = None
+    next_edge: int = 0  # of the plan
+    search: Future[Avoidance] | None = None
+    main: Menace | None = None  # what is searched for
+    due: int = 0  # frame at which the search is taken up
+    since: list[int] = field(default_factory=list)  # edges begun since it was
+
+
+class Dodgers:
+    """K characters who avoid, and what each knows of the attacks on it."""
+
+    def __init__(
+        self,
+        search: AvoidanceSearch,
+        homes: np.ndarray,
+        rng: np.random.Generator,
+        tell: Callable[..., None],
+        *,
+        latency: int = LATENCY,
+    ) -> None:
+        """homes [K, 3]: facing frames. tell(kind, k, **data): the log."""
+        self.search, self.rng, self.tell, self.latency = search, rng, tell, latency
+        self.library = library = search.library
+        self.fps = library.clips.fps
+        self.cast = Cast(library, len(homes))
+        table = library.table
+        part_of = search.graph.part_of
+        self._avoids = part_of[1:] > part_of[:-1]
+        calm = np.flatnonzero(~self._avoids)
+        ways = np.diff(table.action_start)[table.target]
+        restful = calm[ways[calm] >= np.median(ways[calm])] if len(calm) else np.arange(len(ways))
+        self.minds = []
+        for k, home in enumerate(homes):
+            stretch = int(rng.choice(restful))
+            self.cast.place(k, int(table.target[stretch]), home)
+            self.minds.append(Mind(np.array(home, dtype=float), stretch))
+        self.watched: list[np.ndarray | None] = [None] * len(homes)  # [x, z] that each looks at
+        self.cast.show(0.0)
+
+    def menace(self, k: int, attack: Attack, number: int) -> Menace:
+        """Let character k know of an attack on it; one of the same number is replaced."""
+        mind = self.minds[k]
+        for known in mind.menaces:
+            if known.number == number:
+                known.attack, known.covered, known.settled, known.tried = attack, False, False, -1
+                return known
+        mind.menaces.append(Menace(attack, number))
+        return mind.menaces[-1]
+
+    def forget(self, number: int) -> None:
+        """An attack is over for everyone."""
+        for mind in self.minds:
+            mind.menaces = [m for m in mind.menaces if m.number != number]
+
+    def step(self, frame: int) -> None:
+        """One frame: searches are taken up and begun, edges chosen, all move on."""
+        now = frame / self.fps
+        cast = self.cast
+        for k, mind in enumerate(self.minds):
+            if mind.search is not None and frame >= mind.due:
+                self._take_up(k, mind, now)
+            mind.menaces = [m for m in mind.menaces if m.attack.when[-1] >= now]
+            if mind.search is None:
+                self._begin_search(k, mind, frame)
+        for k, mind in enumerate(self.minds):
+            cast.rate[k] = self._rate(mind, now)
+        for k in cast.waiting.tolist():
+            self._go_on(k, self.minds[k])
+        cast.advance()
+
+    def _rate(self, mind: Mind, now: float) -> float:
+        if mind.plan is None:
+            return 1.0
+        then = now + 1.0 / self.fps
+        frames = mind.plan.frames(then) - mind.plan.frames(now)
+        if then > mind.plan.ends:
+            frames += (then - max(now, mind.plan.ends)) * self.fps
+            if now > mind.plan.ends:
+                mind.plan = None
+        return frames
+
+    # Searching -----------------------------------------------------------------------------------
+
+    def standing(self, k: int) -> Standing:
+        """Where character k is."""
+        cast, mind = self.cast, self.minds[k]
+        return Standing(
+            cast.anchor[k].copy(),
+            float(cast.frame[k] + cast.fraction[k]),
+            int(cast.stop[k]),
+            mind.stretch,
+            1.0 / float(cast.rate[k]),
+        )
+
+    def _begin_search(self, k: int, mind: Mind, frame: int) -> None:
+        now = frame / self.fps
+        # In the same edge nothing else would be found, and what is early is not so for long.
+        soon = [
+            m
+            for m in mind.menaces
+            if not (m.covered or m.settled)
+            and m.tried < mind.edges
+            and m.attack.when[-1] - now < SOONEST
+        ]
+        if not soon:
+            return
+        mind.main = min(soon, key=lambda m: m.attack.when[-1])
+        mind.main.tried = mind.edges
+        attacks = [mind.main.attack, *(m.attack for m in mind.menaces if m is not mind.main)]
+        mind.since = []
+        mind.due = frame + self.latency
+        mind.search = _background().submit(self.search.search, self.standing(k), attacks, now)
+
+    def _take_up(self, k: int, mind: Mind, now: float) -> None:
+        assert mind.search is not None and mind.main is not None
+        found, menace = mind.search.result(), mind.main
+        mind.search = mind.main = None
+        if found.outcome not in menace.told or found.outcome == Outcome.FOUND:
+            menace.told.add(found.outcome)
+            self.tell("avoidance", k, **_told(found, menace))
+        if found.outcome in (Outcome.WIDE, Outcome.LATE):
+            menace.settled = True
+            return
+        if found.outcome != Outcome.FOUND or found.plan is None:
+            return
+        for path, part in ((found.path, found.plan.part), *found.others):
+            rest = _after(path, mind.since)
+            if rest is None:
+                continue
+            aim = found.plan.begins + found.aim
+            mind.plan = self.search.timed(self.standing(k), rest, part, aim, now)
+            mind.next_edge = 0
+            for m in mind.menaces:
+                m.covered = m is menace or m.covered
+            menace.covered = True
+            return
+        menace.tried = -1
+        self.tell("stale", k, attack=menace.number, dropped=1 + len(found.others))
+
+    # Going on ------------------------------------------------------------------------------------
+
+    def _go_on(self, k: int, mind: Mind) -> None:
+        """Character k begins another edge: its plan's, or one that suits."""
+        table = self.library.table
+        if mind.plan is not None and mind.next_edge < len(mind.plan.path):
+            stretch = mind.plan.path[mind.next_edge]
+            mind.next_edge += 1
+        else:
+            stretch = self._idle(k, mind)
+            for m in mind.menaces:  # what is still to come is thought about anew
+                m.covered = False
+        mind.stretch = stretch
+        mind.since.append(stretch)
+        mind.edges += 1
+        chosen = np.full(self.cast.count, stretch)
+        self.cast.begin(np.array([k]), chosen)
+        self.tell(
+            "decision", k, stretch=int(stretch), jump=bool(self.cast.jump[k]),
+            frames=int(table.duration[stretch]),
+        )  # fmt: skip
+
+    def _idle(self, k: int, mind: Mind) -> int:
+        """A way to go on that avoids nothing, looks where it should and stays near home."""
+        table, cast = self.library.table, self.cast
+        state = int(np.searchsorted(table.state_frame, cast.stop[k]))
+        ways = table.stretch[table.actions_of(state)]
+        calm = ways[~self._avoids[ways]]
+        ways = calm if len(calm) else ways
+        facing = planar_compose(cast.anchor[k], self.library.clips.facing[int(cast.stop[k])])
+        ends = planar_compose(facing, table.displacement[ways])
+        watched = self.watched[k]
+        if watched is None:
+            want = np.full(len(ends), mind.home[2])
+        else:
+            want = np.arctan2(watched[0] - ends[:, 0], watched[1] - ends[:, 1])
+        off = np.abs(wrap_angle(want - ends[:, 2]))
+        away = np.linalg.norm(ends[:, :2] - mind.home[:2], axis=1)
+        cost = off + HOME * np.maximum(away - TOO_FAR, 0.0)
+        few = np.argsort(cost, kind="stable")[:FEW]
+        few = few[cost[few] <= cost[few[0]] + 0.15]
+        return int(ways[self.rng.choice(few)])
+
+
+def _after(path: Sequence[int], begun: Sequence[int]) -> tuple[int, ...] | None:
+    """What is left of a path after the edges begun; None if it is another path."""
+    if tuple(path[: len(begun)]) != tuple(begun) or len(path) < len(begun):
+        return None
+    return tuple(path[len(begun) :])
+
+
+def _told(found: Avoidance, menace: Menace) -> dict:
+    """What the log says of a search."""
+    out: dict = {"attack": menace.number, "outcome": found.outcome}
+    if np.isfinite(found.aim):
+        out["aim"] = round(found.aim, 4)
+    if found.counts:
+        names = ("valid", "hit", "culled", "stiff", "too_fast", "too_long")
+        out["candidates"] = found.candidates
+        out |= {name: n for name, n in zip(names, found.counts) if n}
+    if found.outcome == Outcome.FOUND:
+        out |= {
+            "path": list(found.path),
+            "part": found.part,
+            "indexed": found.indexed,
+            "scale": round(found.scale, 4),
+            "cost": round(found.cost, 5),
+            "costs": [round(c, 5) for c in found.costs],
+            "distance": round(found.distance, 4),
+            "before": round(found.before, 4),
+        }
+    return out
