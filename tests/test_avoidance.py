@@ -6,14 +6,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
 
 from kumite.annotate import (
     AvoidanceParts,
+    find_actions,
     find_avoidance,
     find_contacts,
+    find_strikes,
     no_avoidance,
+    read_actions,
+    read_avoidance,
+    write_actions,
 )
+from kumite.annotate.action_file import Line, merge, parse, to_lines, write
 from kumite.annotate.action_score import score_avoidance, true_avoidance
+from kumite.cli import app
 from kumite.clip import Clip, ClipSet, Skeleton, concatenate, mirror, resample
 from kumite.errors import KumiteError
 from kumite.performer import perform
@@ -231,3 +241,173 @@ def test_scores_are_counted_one_to_one():
     assert np.allclose(score.stop_off, 1 / clips.fps)
     none = score_avoidance(clips, no_avoidance(clips.clip_start), made.truth)
     assert none.right == 0 and none.recall == 0.0
+
+
+# The file ----------------------------------------------------------------------------------------
+
+FRAMES = 100
+CLIPS = concatenate([toys.still(FRAMES, name="a b"), toys.still(FRAMES, name="c")])
+
+
+def idle(clip: str, start: int, stop: int, *avoid: tuple[int, int]) -> Line:
+    return Line(clip, start, stop, "idle", "-", "none", "idle", avoid=avoid)
+
+
+def tiled(*avoid: tuple[int, int], cuts: tuple[int, ...] = (20, 50)) -> list[Line]:
+    """Lines of a program over both clips, cut at 20 and 50, with these parts in the first clip."""
+    bounds = [0, *cuts, FRAMES]
+    return [
+        idle(n, a, b, *(p for p in avoid if n == "a b" and a <= (p[0] + p[1] - 1) // 2 < b))
+        for n in CLIPS.names
+        for a, b in zip(bounds[:-1], bounds[1:])
+    ]
+
+
+def file_of(path: Path, lines: list[Line]) -> Path:
+    write(path, merge(None, lines, [CLIPS])[0])
+    return path
+
+
+def parts_of(path: Path) -> list[tuple[int, int]]:
+    parts = read_avoidance(path, CLIPS)
+    return list(zip(parts.start.tolist(), parts.stop.tolist()))
+
+
+def edited(path: Path, old: str, new: str) -> None:
+    """One line of a file, as a person changes it."""
+    rows = path.read_text().split("\n")
+    (at,) = [k for k, row in enumerate(rows) if old in row and not row.startswith("#")]
+    rows[at] = rows[at].replace(old, new)
+    path.write_text("\n".join(rows))
+
+
+def test_parts_are_written_and_read(tmp_path: Path):
+    path = file_of(tmp_path / "actions.txt", tiled((18, 24), (60, 70), (80, 90)))
+    row = next(r for r in path.read_text().split("\n") if "avoid=18-24" in r)
+    assert row.split()[2:4] == ["20", "50"]  # its middle lies there
+    assert parts_of(path) == [(18, 24), (60, 70), (80, 90)]
+    before, actions = path.read_bytes(), read_actions(path, CLIPS)
+    write_actions(path, actions, CLIPS, read_avoidance(path, CLIPS))
+    assert path.read_bytes() == before
+    assert all(not x.by_hand for s in parse(path).sections.values() for x in s.lines)
+    write_actions(path, actions, CLIPS)
+    assert parts_of(path) == [] and len(read_actions(path, CLIPS)) == len(actions)
+
+
+def test_a_file_without_parts_is_as_it_was(tmp_path: Path):
+    path = file_of(tmp_path / "actions.txt", tiled())
+    rows = [r for r in path.read_text().split("\n") if r.startswith('"a b"')]
+    assert rows[0] == f'"a b"   0   20  idle  -  none  idle  {tiled()[0].check}'
+
+
+def test_edits_of_parts_survive_another_analysis(tmp_path: Path):
+    path = file_of(tmp_path / "actions.txt", tiled((5, 12), (60, 70), (80, 90)))
+    edited(path, "avoid=60-70", "avoid=62-75")  # moved; the line's other part is its, too
+    edited(path, "avoid=5-12", "")  # taken out
+    rows = path.read_text().split("\n")
+    at = next(k for k, row in enumerate(rows) if row.startswith("c ") and " 20 " in row)
+    rows[at] = "c 20 50 idle - none idle avoid=30-40  # a new one"
+    path.write_text("\n".join(rows))
+    mine = [(62, 75), (80, 90), (130, 140)]
+    assert parts_of(path) == mine
+    for _ in range(2):
+        fresh = tiled((6, 11), (30, 40), (48, 53), (58, 68), cuts=(22, 47))
+        content, kept = merge(parse(path), fresh, [CLIPS])
+        write(path, content)
+        assert parts_of(path) == [(30, 40), *mine]
+        assert kept.parts == 4 and kept.lines == 3
+
+
+def test_what_two_lines_claim_is_the_persons(tmp_path: Path):
+    path = file_of(tmp_path / "actions.txt", tiled((15, 18), (44, 58)))
+    edited(path, "avoid=15-18", "avoid=16-22")
+    assert parts_of(path) == [(16, 22), (44, 58)]
+    content, _ = merge(parse(path), tiled((20, 30), (44, 58)), [CLIPS])
+    write(path, content)
+    assert parts_of(path) == [(16, 22), (44, 58)]  # 20 to 30 overlaps the person's
+
+
+BAD = [
+    ("avoid=60", "'avoid=60' is no part; expected avoid=START-STOP"),
+    ("avoid=-1-60", "is no part; expected avoid=START-STOP"),
+    ("avoid=60-70-80", "is no part"),
+    ("avoid=60-70.5", "is no part"),
+    ("avoid=70-70", "avoid=70-70: stop 70 is not after start 70"),
+    ("avoid=30-40", "avoid=30-40 is not of the action 50 to 100; expected its middle in it"),
+    ("avoid=90-101", "avoid=90-101 is outside clip 'a b'; expected at most 100"),
+    ("avoid=60-70 avoid=69-80", "avoid=69-80 overlaps avoid=60-70 of line"),
+    ("avoid=60-70 avoid=60-70", "avoid=60-70 overlaps avoid=60-70 of line"),
+    ("more words", "9 words; expected clip start stop"),
+]
+
+
+@pytest.mark.parametrize(("word", "message"), BAD)
+def test_a_bad_part_is_told(tmp_path: Path, word: str, message: str):
+    path = file_of(tmp_path / "actions.txt", [x for x in tiled() if x.start != 50])
+    path.write_text(path.read_text() + f'"a b" 50 100 idle - none idle {word}\n')
+    number = len(path.read_text().split("\n")) - 1
+    with pytest.raises(KumiteError) as error:
+        read_avoidance(path, CLIPS)
+    assert message in str(error.value) and str(error.value).startswith(f"{path}:{number}: ")
+
+
+spans = st.tuples(st.integers(0, FRAMES - 1), st.integers(1, 30)).map(
+    lambda x: (x[0], min(x[0] + x[1], FRAMES))
+)
+
+
+def apart(found: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    out: list[tuple[int, int]] = []
+    for a, b in sorted(found):
+        if not out or a >= out[-1][1]:
+            out.append((a, b))
+    return out
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    parts=st.lists(spans, max_size=6).map(apart),
+    others=st.lists(st.lists(spans, max_size=6).map(apart), min_size=1, max_size=3),
+    cuts=st.lists(st.sets(st.integers(1, FRAMES - 1), max_size=5), min_size=4, max_size=4),
+    touched=st.sets(st.integers(0, 5)),
+)
+def test_no_part_of_a_persons_line_is_lost(tmp_path_factory, parts, others, cuts, touched):
+    path = tmp_path_factory.mktemp("parts") / "actions.txt"
+    write(path, merge(None, tiled(*parts, cuts=tuple(sorted(cuts[0]))), [CLIPS])[0])
+    assert parts_of(path) == parts
+    rows = path.read_text().split("\n")
+    at = [k for k, row in enumerate(rows) if row.startswith('"a b"')]
+    for k in touched & set(range(len(at))):
+        rows[at[k]] = " ".join(rows[at[k]].split()[:-1])  # without its check word: a person's
+    path.write_text("\n".join(rows))
+    hand = [x for x in parse(path).sections["a b"].lines if x.by_hand]
+    mine = {part for x in hand for part in x.avoid}
+    for other, cut in zip(others, cuts[1:]):
+        content, kept = merge(parse(path), tiled(*other, cuts=tuple(sorted(cut))), [CLIPS])
+        write(path, content)
+        now = parts_of(path)  # sorted, disjoint and in their clip, or it would be refused
+        assert mine <= set(now) <= mine | set(other)
+        assert kept.parts == len(now)
+
+
+def test_every_found_part_is_in_the_file(tmp_path: Path):
+    clips = concatenate(perform("avoidance", seed=5, mirrored=False).clips)
+    contacts = find_contacts(clips)
+    actions = find_actions(clips, contacts, find_strikes(clips))
+    parts = find_avoidance(clips, contacts, actions=actions)
+    assert sum(len(x.avoid) for x in to_lines(actions, clips, parts)) == len(parts)
+    path = tmp_path / "actions.txt"
+    write_actions(path, actions, clips, parts)
+    back = read_avoidance(path, clips)
+    assert np.array_equal(back.start, parts.start) and np.array_equal(back.stop, parts.stop)
+
+
+def test_the_command_writes_and_scores_parts(tmp_path: Path):
+    path = tmp_path / "actions.txt"
+    command = ["segment", "--style", "avoidance", "-o", str(path), "--score"]
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 0, done.output
+    assert "avoidance parts of 5 clips" in done.output
+    assert "avoidance parts: 116 true" in done.output
+    done = CliRunner().invoke(app, [*command, "--json"])
+    assert done.exit_code == 0 and '"avoidance_parts": 1' in done.output

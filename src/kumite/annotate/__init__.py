@@ -2,7 +2,7 @@
 without hand work; and how like a person they move.
 """
 
-from kumite.annotate.action_file import read_actions, write_actions
+from kumite.annotate.action_file import read_actions, read_avoidance, write_actions
 from kumite.annotate.actions import (
     DIRECTIONS,
     DIRECTIONS_OF,
@@ -43,6 +43,7 @@ __all__ = [
     "no_avoidance",
     "only_blows",
     "read_actions",
+    "read_avoidance",
     "shorter_rests",
     "write_actions",
 ]

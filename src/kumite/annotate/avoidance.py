@@ -1,4 +1,4 @@
-"""Avoidance parts: the body leaves the place it was in, quickly, and returns (Oshita & Masaoka 2011,
+"""Avoidance parts: the body leaves its place, quickly, and returns (Oshita & Masaoka 2011,
 section 3.1, where a person marks them).
 
 A duck, a twist, a lean, a slip, a leg that is lifted and a jump return to where they began. A step
