@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,10 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from kumite.annotate import (
+    DIRECTIONS,
+    KINDS,
+    NO_LIMB,
+    Actions,
     AvoidanceParts,
     find_actions,
     find_avoidance,
@@ -26,6 +31,16 @@ from kumite.annotate.action_score import score_avoidance, true_avoidance
 from kumite.cli import app
 from kumite.clip import Clip, ClipSet, Skeleton, concatenate, mirror, resample
 from kumite.errors import KumiteError
+from kumite.graph import (
+    Library,
+    build_action_library,
+    build_library,
+    builtin_library,
+    find_transitions,
+    load_library,
+    save_library,
+)
+from kumite.graph.whole import uncut
 from kumite.performer import perform
 from kumite.rotation import from_axis_angle, multiply
 from tests import toys
@@ -411,3 +426,219 @@ def test_the_command_writes_and_scores_parts(tmp_path: Path):
     assert "avoidance parts: 116 true" in done.output
     done = CliRunner().invoke(app, [*command, "--json"])
     assert done.exit_code == 0 and '"avoidance_parts": 1' in done.output
+
+
+# The graph ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def avoider() -> ClipSet:
+    return concatenate(perform("avoidance", seed=0, mirrored=False).clips)
+
+
+def is_whole(library: Library) -> None:
+    """Each stretch has all frames of a part or none."""
+    table, parts = library.table, library.avoidance
+    for a, b in zip(parts.start, parts.stop):
+        some = (table.first < b) & (table.last >= a)
+        all_of = (table.first <= a) & (table.last >= b - 1)
+        assert np.array_equal(some, all_of)
+    begin, part = library.parts_of_stretch
+    for k in range(len(table.first)):
+        held = part[begin[k] : begin[k + 1]]
+        assert np.all(parts.start[held] >= table.first[k])
+        assert np.all(parts.stop[held] - 1 <= table.last[k])
+
+
+@pytest.mark.parametrize("event", ["none", "left", "both"])
+def test_no_transition_cuts_a_part(avoider: ClipSet, event: str):
+    contacts = find_contacts(avoider)
+    parts = find_avoidance(avoider, contacts)
+    per_second = 3.0 if event == "none" else 52.0
+    made = find_transitions(avoider, contacts, event=event, per_second=per_second, whole=parts)
+    for a, b in zip(parts.start.tolist(), parts.stop.tolist()):
+        assert not np.any((made.source >= a) & (made.source < b - 1))
+        assert not np.any((made.target > a) & (made.target < b))
+    free = find_transitions(avoider, contacts, event=event, per_second=per_second)
+    cut = [
+        np.any((free.source >= a) & (free.source < b - 1))
+        for a, b in zip(parts.start.tolist(), parts.stop.tolist())
+    ]
+    assert any(cut)  # so it was needed
+    library = build_library(avoider, event=event, per_second=per_second, avoidance=parts)
+    is_whole(library)
+    held = np.unique(library.parts_of_stretch[1])
+    assert library.report["avoidance_parts"] == len(parts)
+    assert library.report["avoidance_parts_kept"] == len(held) > 0.8 * len(parts)
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    st.lists(st.tuples(st.integers(0, 399), st.integers(1, 60)), max_size=8),
+    st.sampled_from(["none", "both"]),
+)
+def test_any_parts_are_kept_whole(avoider: ClipSet, spans: list[tuple[int, int]], event: str):
+    short = concatenate([next(iter(avoider))])
+    found = apart([(a, min(a + n, len(short))) for a, n in spans])
+    parts = AvoidanceParts(*np.array(found, np.int64).reshape(-1, 2).T, short.clip_start)
+    try:
+        library = build_library(short, event=event, per_second=4.0, avoidance=parts)
+    except KumiteError as error:
+        assert "too few" in str(error)
+        return
+    is_whole(library)
+
+
+def test_a_graph_of_actions_keeps_parts_whole(avoider: ClipSet):
+    library = build_action_library(avoider, avoidance=True)
+    is_whole(library)
+    parts = library.avoidance
+    assert len(np.unique(library.parts_of_stretch[1])) >= 0.95 * len(parts)
+    action = library.actions
+    assert action is not None
+    for a, b in zip(parts.start, parts.stop):
+        assert not np.any((action.start > a) & (action.start < b))
+
+
+def test_a_graph_is_as_it_was_where_nobody_asks(avoider: ClipSet):
+    library = build_library(avoider)
+    assert len(library.avoidance) == 0 and "avoidance_parts" not in library.report
+    assert len(library.parts_of_stretch[1]) == 0
+    assert np.array_equal(library.parts_of_stretch[0], np.zeros(len(library.table.first) + 1))
+    none = build_library(avoider, avoidance=no_avoidance(avoider.clip_start))
+    assert np.array_equal(none.table.stretch, library.table.stretch)
+    with pytest.raises(KumiteError, match="avoidance parts: of other clips"):
+        build_library(avoider, avoidance=some([10], [20]))
+    with pytest.raises(KumiteError, match="avoidance parts are of other clips"):
+        Library(
+            library.clips,
+            library.contacts,
+            library.strikes,
+            library.table,
+            avoidance=some([10], [20]),
+        )
+
+
+def test_a_library_keeps_its_parts(avoider: ClipSet, tmp_path: Path):
+    library = build_library(avoider, event="both", avoidance=True)
+    path = tmp_path / "a.kumite"
+    save_library(path, library)
+    back = load_library(path)
+    assert np.array_equal(back.avoidance.start, library.avoidance.start)
+    assert np.array_equal(back.avoidance.stop, library.avoidance.stop)
+    assert back.digest == library.digest
+    none = Library(library.clips, library.contacts, library.strikes, library.table, library.report)
+    assert none.digest != library.digest
+    save_library(path, none)
+    assert len(load_library(path).avoidance) == 0
+
+
+def line(*cuts: int, clips: tuple[int, ...] = (0, 100)) -> Actions:
+    bounds = sorted({*cuts, *clips})
+    count = len(bounds) - 1
+    return Actions(
+        np.array(bounds[:-1]),
+        np.array(bounds[1:]),
+        np.full(count, KINDS.index("idle")),
+        np.full(count, NO_LIMB),
+        np.full(count, DIRECTIONS.index("none")),
+        tuple(f"{a}" for a in bounds[:-1]),
+        np.array(clips),
+    )
+
+
+@pytest.mark.parametrize(
+    ("cuts", "start", "stop", "shortest", "expected"),
+    [
+        ((30, 60), [32], [50], 1, [(0, 30), (30, 60), (60, 100)]),  # nothing is cut
+        ((30, 60), [50], [64], 1, [(0, 30), (30, 64), (64, 100)]),  # its end moves
+        ((30, 60), [25], [45], 1, [(0, 25), (25, 60), (60, 100)]),  # its beginning moves
+        ((30, 34), [25], [40], 1, [(0, 25), (25, 40), (40, 100)]),  # both
+        ((30, 34), [20], [50], 1, [(0, 20), (20, 100)]),  # the middle is the third's
+        ((5, 30), [3], [12], 5, [(0, 30), (30, 100)]),  # 3 frames are too few: they join
+        ((30, 60, 64), [40], [62], 5, [(0, 30), (30, 64), (64, 100)]),
+        ((30, 60), [25, 40], [32, 62], 1, [(0, 32), (32, 62), (62, 100)]),
+    ],
+)
+def test_what_is_cut_is_moved_or_joined(cuts, start, stop, shortest: int, expected):
+    parts = some(start, stop, [0, 100])
+    found = uncut(line(*cuts), parts, shortest)
+    got = list(zip(found.start.tolist(), found.stop.tolist()))
+    assert got == expected
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.sets(st.integers(1, 99), max_size=10),
+    st.lists(spans, max_size=6).map(apart),
+    st.integers(1, 8),
+)
+def test_no_part_is_cut_and_no_frame_is_lost(cuts, found, shortest: int):
+    found = apart([x for x in found if x[1] <= 40] + [x for x in found if x[0] >= 40])
+    parts = AvoidanceParts(*np.array(found, np.int64).reshape(-1, 2).T, np.array([0, 40, 100]))
+    made = uncut(line(*cuts, clips=(0, 40, 100)), parts, shortest)
+    for a, b in found:
+        inside = (made.start <= a) & (made.stop >= b)
+        assert inside.sum() == 1
+    assert np.sum(made.stop - made.start) == 100
+
+
+def test_parts_of_no_action_cut_none():
+    first = line(30, 60)
+    gap = Actions(
+        first.start[[0, 2]],
+        first.stop[[0, 2]],
+        first.kind[:2],
+        first.limb[:2],
+        first.direction[:2],
+        first.label[:2],
+        first.clip_start,
+    )
+    found = uncut(gap, some([35], [55], [0, 100]))
+    assert found.start.tolist() == [0, 60]
+
+
+@pytest.mark.parametrize("level", ["frames", "actions"])
+def test_the_performers_ways_out_are_near(level: str):
+    library = builtin_library(None, style="avoidance", level=level)
+    is_whole(library)
+    assert np.percentile(until_avoidance(library), 95) < (1.2 if level == "frames" else 0.6)
+    assert len(builtin_library(None).avoidance) == 0
+
+
+def until_avoidance(library: Library) -> np.ndarray:
+    """Seconds [N] from each state until the middle of the nearest part."""
+    table, (begin, part) = library.table, library.parts_of_stretch
+    nearest = np.full(len(table.first), np.inf)
+    for k in np.flatnonzero(np.diff(begin)):
+        nearest[k] = library.avoidance.centre[part[begin[k]]] - table.first[k] + 1
+    best = np.full(table.states, np.inf)
+    while True:
+        after = np.minimum(nearest, table.duration + best[table.target])[table.stretch]
+        now = np.minimum.reduceat(after, table.action_start[:-1])
+        if np.array_equal(now, best):
+            return best / library.clips.fps
+        best = now
+
+
+def test_the_command_builds_with_parts(tmp_path: Path):
+    made = CliRunner().invoke(app, ["perform", "avoidance", "-o", str(tmp_path / "bvh")])
+    assert made.exit_code == 0, made.output
+    bvh = sorted(str(p) for p in (tmp_path / "bvh").glob("lean*.bvh"))
+    output = str(tmp_path / "a.kumite")
+    build = ["build", *bvh, "-o", output, "--avoidance", "--event", "both"]
+    done = CliRunner().invoke(app, build)
+    assert done.exit_code == 0, done.output
+    assert "avoidance parts of" in done.output and "each within one action" in done.output
+    found = len(load_library(output).avoidance)
+    actions = str(tmp_path / "actions.txt")
+    assert CliRunner().invoke(app, ["segment", *bvh, "-o", actions]).exit_code == 0
+    text = Path(actions).read_text()
+    Path(actions).write_text(re.sub(r" avoid=\d+-\d+", "", text, count=1))
+    for level in ("frames", "actions"):
+        command = ["build", *bvh, "-o", output, "--avoidance", "--level", level]
+        done = CliRunner().invoke(app, [*command, "--actions", actions])
+        assert done.exit_code == 0, done.output
+        assert len(load_library(output).avoidance) == found - 1
+    done = CliRunner().invoke(app, ["build", *bvh, "-o", output, "--actions", actions])
+    assert isinstance(done.exception, KumiteError)
