@@ -1,8 +1,8 @@
-"""What happens in the clips: foot contacts, effective hits and actions, found without hand work;
-and how like a person they move.
+"""What happens in the clips: foot contacts, effective hits, actions and avoidance parts, found
+without hand work; and how like a person they move.
 """
 
-from kumite.annotate.action_file import read_actions, write_actions
+from kumite.annotate.action_file import read_actions, read_avoidance, write_actions
 from kumite.annotate.actions import (
     DIRECTIONS,
     DIRECTIONS_OF,
@@ -12,6 +12,12 @@ from kumite.annotate.actions import (
     ActionSettings,
     find_actions,
     shorter_rests,
+)
+from kumite.annotate.avoidance import (
+    AvoidanceParts,
+    AvoidanceSettings,
+    find_avoidance,
+    no_avoidance,
 )
 from kumite.annotate.contacts import Contacts, find_contacts
 from kumite.annotate.likeness import Likeness, measure_likeness
@@ -24,15 +30,20 @@ __all__ = [
     "NO_LIMB",
     "ActionSettings",
     "Actions",
+    "AvoidanceParts",
+    "AvoidanceSettings",
     "Contacts",
     "Likeness",
     "Strikes",
     "find_actions",
+    "find_avoidance",
     "find_contacts",
     "find_strikes",
     "measure_likeness",
+    "no_avoidance",
     "only_blows",
     "read_actions",
+    "read_avoidance",
     "shorter_rests",
     "write_actions",
 ]

@@ -8,7 +8,8 @@
 
 A clip's heading says how many frames it has; under it stands a line for each action: clip, start,
 stop (frames of the clip; stop is one past the last), kind, limb, direction, label. Words with a
-space in them stand in double quotes.
+space in them stand in double quotes. Behind the label may stand ``avoid=START-STOP`` words: the
+avoidance parts whose middle lies in the action, which may begin before it or end after it.
 
 **Edits survive.** Nothing but the file itself tells what a person has done, so that it can be
 moved, mailed and kept in version control:
@@ -19,6 +20,9 @@ moved, mailed and kept in version control:
   heading that no line covers were uncovered by a person: they stay so;
 - a comment (from ``#`` to the end of a line) makes its line a person's; one on a line of its own is
   kept before the line that it stood before.
+
+An avoidance part is a word of its action's line, so an edit of it, or of the line it stands in, is
+kept in the same way, and so is that a person took it out.
 
 So :func:`merge` needs no memory: it keeps what a person wrote, leaves out what a person took out
 and fills the rest from a new analysis. Where both claim a frame, the person's line has it.
@@ -37,12 +41,14 @@ import numpy as np
 
 from kumite import files
 from kumite.annotate.actions import DIRECTIONS, DIRECTIONS_OF, KINDS, NO_LIMB, Actions
+from kumite.annotate.avoidance import AvoidanceParts
 from kumite.clip import LIMBS, ClipSet
 from kumite.errors import KumiteError, at, unknown
 from kumite.mocap import text
 
 NONE = "-"  # no limb, no label
 HEADING = "=="
+AVOID = "avoid="
 OURS = "#:"  # begins a comment of ours, which is written anew each time
 _WORD = re.compile(r'\s*("(?:[^"\\]|\\.)*"|#.*|[^\s#"][^\s"]*)')
 SLIVER = 0.15  # s: less than this left of a line is not an action
@@ -53,6 +59,7 @@ _HELP = (
     "change, add, split, join or delete lines as you like: running it again keeps what you did",
     "start and stop are frames of the clip, stop is one past the last; words with spaces in quotes",
     "the check word tells lines that you have not touched; delete it to keep a line as it is",
+    f"{AVOID}START-STOP behind a label: frames in which the body is out of where it was",
     *(f"{kind}: {', '.join(ways)}" for kind, ways in DIRECTIONS_OF.items()),
     f"limb: {', '.join(LIMBS)} or {NONE}; a sword strikes with the hand that holds it",
 )
@@ -72,6 +79,7 @@ class Line:
     by_hand: bool = False
     comment: str = ""  # behind it, with its #
     number: int | None = None  # line in the file it was read from
+    avoid: tuple[tuple[int, int], ...] = ()  # (start, stop) of its avoidance parts, in order
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -83,6 +91,7 @@ class Line:
             self.limb,
             _quoted(self.direction),
             _quoted(self.label or NONE),
+            *(f"{AVOID}{a}-{b}" for a, b in self.avoid),
         )
 
     @property
@@ -115,6 +124,7 @@ class Kept:
 
     lines: int = 0
     gaps: int = 0  # runs of frames that no line covers
+    parts: int = 0  # avoidance parts, those of the program's lines too
     comments: int = 0
     written: int = 0  # lines by the program
     clips: list[str] = field(default_factory=list)  # with any of these
@@ -216,8 +226,13 @@ def _heading(path: Path, number: int, words: list[str]) -> tuple[str, Section]:
 
 
 def _line(path: Path, number: int, words: list[str], comment: str) -> Line:
+    avoid = [word for word in words[7:] if word.startswith(AVOID)]
+    words = [*words[:7], *(word for word in words[7:] if not word.startswith(AVOID))]
     if len(words) not in (7, 8):
-        shape = "clip start stop kind limb direction label, and perhaps a check word"
+        shape = (
+            f"clip start stop kind limb direction label, perhaps {AVOID}START-STOP, "
+            "and perhaps a check word"
+        )
         raise at(
             path, number, f"{len(words)} words; expected {shape} (labels with spaces in quotes)"
         )
@@ -236,9 +251,34 @@ def _line(path: Path, number: int, words: list[str], comment: str) -> Line:
     if stop <= start:
         raise at(path, number, f"stop {stop} is not after start {start}; expected a later frame")
     label = "" if label == NONE else label
-    line = Line(clip, start, stop, kind, limb, direction, label, True, comment, number)
+    parts = tuple(sorted(_part(path, number, word, start, stop) for word in avoid))
+    line = Line(clip, start, stop, kind, limb, direction, label, True, comment, number, parts)
     untouched = len(words) == 8 and words[7] == line.check and not comment
     return replace(line, by_hand=not untouched)
+
+
+def _part(path: Path, number: int, word: str, start: int, stop: int) -> tuple[int, int]:
+    """An avoidance part of the action from start to stop."""
+    match = re.fullmatch(r"(\d{1,9})-(\d{1,9})", word.removeprefix(AVOID), re.ASCII)
+    if match is None:
+        raise at(
+            path, number, f"{text.shown(word)} is no part; expected {AVOID}START-STOP, two frames"
+        )
+    a, b = int(match[1]), int(match[2])
+    if b <= a:
+        raise at(path, number, f"{word}: stop {b} is not after start {a}; expected a later frame")
+    if not start <= middle(a, b) < stop:
+        raise at(
+            path,
+            number,
+            f"{word} is not of the action {start} to {stop}; expected its middle in it",
+        )
+    return a, b
+
+
+def middle(start: int, stop: int) -> int:
+    """The frame that says which action a part belongs to."""
+    return (start + stop - 1) // 2
 
 
 def _frame(path: Path, number: int, word: str, what: str) -> int:
@@ -249,7 +289,7 @@ def _frame(path: Path, number: int, word: str, what: str) -> int:
 
 def check(path: Path | str, known: ActionFile, clips: Sequence[ClipSet]) -> None:
     """That a file fits clips. Errors: an unknown clip, another rate, a line outside its clip, two
-    lines by hand that overlap.
+    lines by hand, or two avoidance parts of such lines, that overlap.
     """
     size = {n: int(k) for s in clips for n, k in zip(s.names, np.diff(s.clip_start))}
     rate = {n: s.fps for s in clips for n in s.names}
@@ -280,6 +320,29 @@ def check(path: Path | str, known: ActionFile, clips: Sequence[ClipSet]) -> None
                     f"({before.start} to {before.stop}); expected actions one after the other",
                 )
             before = line
+        _check_parts(path, section, size[name])
+
+
+def _check_parts(path: Path | str, section: Section, frames: int) -> None:
+    """That avoidance parts of a person's lines lie in their clip and do not overlap."""
+    before: tuple[int, int, int | None] | None = None
+    parts = [(a, b, x) for x in section.lines if x.by_hand for a, b in x.avoid]
+    for a, b, line in sorted(parts, key=lambda part: part[:2]):
+        word = f"{AVOID}{a}-{b}"
+        if b > frames:
+            raise at(
+                path,
+                line.number,
+                f"{word} is outside clip {line.clip!r}; expected at most {frames}",
+            )
+        if before is not None and a < before[1]:
+            raise at(
+                path,
+                line.number,
+                f"{word} overlaps {AVOID}{before[0]}-{before[1]} of line {before[2]}; "
+                "expected parts one after the other",
+            )
+        before = (a, b, line.number)
 
 
 def read_actions(path: Path | str, clips: ClipSet) -> Actions:
@@ -288,6 +351,16 @@ def read_actions(path: Path | str, clips: ClipSet) -> Actions:
     Clips that the file does not name have none. Errors: not such a file; a line that is wrong or
     does not fit the clips, as ``actions.txt:17: what; what was expected``.
     """
+    return to_actions(_lines_of(path, clips), clips)
+
+
+def read_avoidance(path: Path | str, clips: ClipSet) -> AvoidanceParts:
+    """The avoidance parts that a file of actions gives clips. Errors: as :func:`read_actions`."""
+    return to_parts(_lines_of(path, clips), clips)
+
+
+def _lines_of(path: Path | str, clips: ClipSet) -> list[Line]:
+    """A file's lines, in order of clips and starts, each frame and part in one of them only."""
     known = parse(path)
     check(path, known, [clips])
     lines = []
@@ -304,8 +377,27 @@ def read_actions(path: Path | str, clips: ClipSet) -> Actions:
             if not x.by_hand
             for piece in _free_pieces(x, taken, claim=True)
         ]
-        lines += sorted([*hand, *rest], key=lambda x: x.start)
-    return to_actions(lines, clips)
+        lines += _settled(sorted([*hand, *rest], key=lambda x: x.start))
+    return lines
+
+
+def _settled(lines: Iterable[Line]) -> list[Line]:
+    """Lines of a clip, no part in two of them: a person's have it first, then earlier ones."""
+    lines = list(lines)
+    taken: list[tuple[int, int]] = [part for x in lines if x.by_hand for part in x.avoid]
+    out = []
+    for x in lines:
+        if not x.by_hand and x.avoid:
+            free = tuple(
+                (a, b)
+                for a, b in x.avoid
+                if x.start <= middle(a, b) < x.stop
+                and all(b <= start or stop <= a for start, stop in taken)
+            )
+            taken += free
+            x = replace(x, avoid=free)
+        out.append(x)
+    return out
 
 
 # Writing -----------------------------------------------------------------------------------------
@@ -327,8 +419,26 @@ def to_actions(lines: Iterable[Line], clips: ClipSet) -> Actions:
     )
 
 
-def to_lines(actions: Actions, clips: ClipSet) -> list[Line]:
-    """Actions as lines of a file, as a program writes them."""
+def to_parts(lines: Iterable[Line], clips: ClipSet) -> AvoidanceParts:
+    """The avoidance parts of lines of a file."""
+    first = {n: int(a) for n, a in zip(clips.names, clips.clip_start)}
+    found = sorted((first[x.clip] + a, first[x.clip] + b) for x in lines for a, b in x.avoid)
+    start, stop = np.array(found, dtype=np.int64).reshape(-1, 2).T
+    return AvoidanceParts(start, stop, clips.clip_start)
+
+
+def to_lines(
+    actions: Actions, clips: ClipSet, avoidance: AvoidanceParts | None = None
+) -> list[Line]:
+    """Actions as lines of a file, as a program writes them.
+
+    avoidance: parts of the same clips; those whose middle lies in no action are left out.
+    """
+    parts: dict[int, list[tuple[int, int]]] = {}
+    if avoidance is not None:
+        for a, b in zip(avoidance.start.tolist(), avoidance.stop.tolist()):
+            k = int(np.searchsorted(actions.start, middle(a, b), side="right")) - 1
+            parts.setdefault(k, []).append((a, b))
     return [
         Line(
             clips.names[c],
@@ -338,15 +448,21 @@ def to_lines(actions: Actions, clips: ClipSet) -> list[Line]:
             NONE if limb == NO_LIMB else LIMBS[limb],
             DIRECTIONS[way],
             "" if label == NONE else label,
+            avoid=tuple(
+                (p - int(clips.clip_start[c]), q - int(clips.clip_start[c]))
+                for p, q in parts.get(k, ())
+            ),
         )
-        for c, a, b, kind, limb, way, label in zip(
-            actions.clip,
-            actions.start,
-            actions.stop,
-            actions.kind,
-            actions.limb,
-            actions.direction,
-            actions.label,
+        for k, (c, a, b, kind, limb, way, label) in enumerate(
+            zip(
+                actions.clip,
+                actions.start,
+                actions.stop,
+                actions.kind,
+                actions.limb,
+                actions.direction,
+                actions.label,
+            )
         )
     ]
 
@@ -372,10 +488,11 @@ def merge(
             for x in hand:
                 taken[x.start : x.stop] = True
             new = _left_over(fresh.get(name, ()), taken, round(SLIVER * one.fps))
-            both = sorted([*hand, *new], key=lambda x: x.start)
+            both = _settled(sorted([*hand, *new], key=lambda x: x.start))
             sections[name] = Section(tuple(both), frames, one.fps, old.comments)
             kept.lines += len(hand)
             kept.gaps += gaps
+            kept.parts += sum(len(x.avoid) for x in both)
             kept.comments += len(old.comments)
             kept.written += len(new)
             if hand or gaps or old.comments:
@@ -392,7 +509,7 @@ def _left_over(lines: Iterable[Line], taken: np.ndarray, shortest: int) -> list[
     for x in lines:
         for piece in _free_pieces(x, taken):
             if waiting is not None and waiting.stop == piece.start:
-                piece = replace(piece, start=waiting.start)
+                piece = replace(piece, start=waiting.start, avoid=waiting.avoid + piece.avoid)
                 waiting = None
             elif waiting is not None:
                 out.append(waiting)
@@ -401,7 +518,7 @@ def _left_over(lines: Iterable[Line], taken: np.ndarray, shortest: int) -> list[
             if whole:
                 out.append(piece)
             elif out and out[-1].stop == piece.start:
-                out[-1] = replace(out[-1], stop=piece.stop)
+                out[-1] = replace(out[-1], stop=piece.stop, avoid=out[-1].avoid + piece.avoid)
             else:
                 waiting = piece
     return out if waiting is None else [*out, waiting]
@@ -429,13 +546,15 @@ def _free_pieces(line: Line, taken: np.ndarray, *, claim: bool = False) -> list[
     ]
 
 
-def write_actions(path: Path | str, actions: Actions, clips: ClipSet) -> None:
-    """Write actions as a program does: no line counts as a person's.
+def write_actions(
+    path: Path | str, actions: Actions, clips: ClipSet, avoidance: AvoidanceParts | None = None
+) -> None:
+    """Write actions, and their avoidance parts, as a program does: no line counts as a person's.
 
     Frames of a clip that no action covers count as taken out. Errors: a file that cannot be
     written.
     """
-    write(path, merge(None, to_lines(actions, clips), [clips])[0])
+    write(path, merge(None, to_lines(actions, clips, avoidance), [clips])[0])
 
 
 def write(path: Path | str, content: ActionFile) -> None:
@@ -445,8 +564,9 @@ def write(path: Path | str, content: ActionFile) -> None:
 
 
 def _text(content: ActionFile) -> str:
-    words = [x.words for s in content.sections.values() for x in s.lines]
-    width = [max((len(row[k]) for row in words), default=0) for k in range(7)]
+    words = [_columns(x) for s in content.sections.values() for x in s.lines]
+    columns = 8 if any(row[7] for row in words) else 7
+    width = [max((len(row[k]) for row in words), default=0) for k in range(columns)]
     out = [f"{OURS} {line}" for line in _HELP] + list(content.comments)
     for name, section in content.sections.items():
         out += ["", f"{HEADING} {_quoted(name)}  {section.frames} frames  {section.fps!r} a second"]
@@ -456,12 +576,17 @@ def _text(content: ActionFile) -> str:
                 out.append(waiting.pop(0)[1])
             row = "  ".join(
                 w.rjust(n) if k in (1, 2) else w.ljust(n)
-                for k, (w, n) in enumerate(zip(x.words, width))
+                for k, (w, n) in enumerate(zip(_columns(x), width))
             )
             end = "" if x.by_hand else f"  {x.check}"
             out.append(f"{row}{end}{'  ' + x.comment if x.comment else ''}".rstrip())
         out += [c for _, c in waiting]
     return "\n".join(out) + "\n"
+
+
+def _columns(line: Line) -> list[str]:
+    """The words of a line, its avoidance parts in one column, the eighth."""
+    return [*line.words[:7], " ".join(line.words[7:])]
 
 
 def _quoted(word: str) -> str:

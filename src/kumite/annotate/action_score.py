@@ -7,7 +7,9 @@ On the performer's clips truth is a list of moves with a few frames of guard bet
 - a *found boundary* is where one action of a clip ends and the next begins;
 - they match one to one where they are at most TOLERANCE frames apart: precision is the share of
   found boundaries that match, recall that of true ones;
-- a move's kind is right where the action that shares most frames with it is of that kind.
+- a move's kind is right where the action that shares most frames with it is of that kind;
+- an avoidance part is right where it and a true one have at least half of the frames in common that
+  either has, one to one.
 """
 
 from __future__ import annotations
@@ -18,10 +20,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from kumite.annotate.actions import KINDS, Actions
+from kumite.annotate.avoidance import AvoidanceParts
 from kumite.clip import ClipSet
 from kumite.performer import Truth
 
 TOLERANCE = 3  # frames
+COMMON = 0.5  # of the frames that either of two parts has
 
 
 @dataclass(frozen=True)
@@ -80,6 +84,75 @@ def score_actions(clips: ClipSet, actions: Actions, truth: Sequence[Truth]) -> A
                 confusion[KINDS.index(move.kind), kind[mine][int(np.argmax(shared))]] += 1
         total += ActionScore(len(cuts), int(found_right.sum()), len(bounds), hits, confusion)
     return total
+
+
+@dataclass(frozen=True)
+class AvoidanceScore:
+    """Counts of avoidance parts, and how far the right ones are off."""
+
+    found: int
+    true: int
+    right: int
+    start_off: np.ndarray  # [right] s, found minus true
+    stop_off: np.ndarray  # [right] s
+
+    @property
+    def precision(self) -> float:
+        return self.right / max(self.found, 1)
+
+    @property
+    def recall(self) -> float:
+        return self.right / max(self.true, 1)
+
+    def __add__(self, other: AvoidanceScore) -> AvoidanceScore:
+        return AvoidanceScore(
+            self.found + other.found,
+            self.true + other.true,
+            self.right + other.right,
+            np.concatenate([self.start_off, other.start_off]),
+            np.concatenate([self.stop_off, other.stop_off]),
+        )
+
+
+def true_avoidance(clips: ClipSet, truth: Sequence[Truth]) -> AvoidanceParts:
+    """What the performer marked: frames in which the body is out of where it was."""
+    marked = [
+        (int(first) + a.avoid[0], int(first) + a.avoid[1])
+        for first, known in zip(clips.clip_start[:-1], truth)
+        for a in known.actions
+        if a.avoid is not None
+    ]
+    start, stop = np.array(marked, dtype=np.int64).reshape(-1, 2).T
+    return AvoidanceParts(start, stop, clips.clip_start)
+
+
+def score_avoidance(
+    clips: ClipSet, parts: AvoidanceParts, truth: Sequence[Truth], common: float = COMMON
+) -> AvoidanceScore:
+    """Avoidance parts of the performer's clips against their truth, both at the clips' rate.
+
+    common: the share of frames that makes two parts the same (intersection over union).
+    """
+    true = true_avoidance(clips, truth)
+    start = np.maximum(true.start[:, None], parts.start)
+    stop = np.minimum(true.stop[:, None], parts.stop)
+    either = np.maximum(true.stop[:, None], parts.stop) - np.minimum(
+        true.start[:, None], parts.start
+    )
+    share = np.maximum(stop - start, 0) / either
+    pairs = []
+    while share.size and share.max() >= common:
+        t, p = np.unravel_index(np.argmax(share), share.shape)
+        share[t], share[:, p] = 0.0, 0.0
+        pairs.append((t, p))
+    t, p = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+    return AvoidanceScore(
+        len(parts),
+        len(true),
+        len(pairs),
+        (parts.start[p] - true.start[t]) / clips.fps,
+        (parts.stop[p] - true.stop[t]) / clips.fps,
+    )
 
 
 def true_boundaries(truth: Truth) -> list[tuple[int, int]]:

@@ -31,6 +31,7 @@ def library_values(library: Library) -> dict[str, Any]:
         **library.report,
         "level": "frames" if library.actions is None else "actions",
         "clips": len(clips.names),
+        "avoidance_parts": len(library.avoidance),
     }
     if library.actions is not None:
         ways = np.diff(library.table.action_start)
@@ -51,6 +52,13 @@ def library_lines(library: Library) -> list[str]:
         f"{len(clips)} frames of {len(clips.names)} clips at {clips.fps:g} frames/s, "
         f"{len(library.strikes)} blows"
     ]
+    if len(library.avoidance):
+        held = len(np.unique(library.parts_of_stretch[1]))
+        mean = float(np.mean(library.avoidance.stop - library.avoidance.start)) / clips.fps
+        lines.append(
+            f"{len(library.avoidance)} avoidance parts of {mean:.2f} s on average, "
+            f"{held} of them connected, each within one action"
+        )
     if library.actions is None:
         mean = table.duration[table.stretch].mean() / clips.fps
         kept = f"{r['frames_kept']} frames connected, {r['hits_kept']} blows in them: " if r else ""

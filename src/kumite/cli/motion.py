@@ -175,8 +175,15 @@ def build(
     ] = None,
     actions: Annotated[
         Path | None,
-        typer.Option(help="Actions: the text file of 'kumite segment' (default: as found)."),
+        typer.Option(
+            help="The text file of 'kumite segment', for its actions (--level actions) and its "
+            "avoidance parts (--avoidance); default: as found."
+        ),
     ] = None,
+    avoidance: Annotated[
+        bool,
+        typer.Option(help="Keep avoidance parts whole: each within one edge of the graph."),
+    ] = False,
     alike: Annotated[
         float | None,
         typer.Option(help="Actions: postures nearer than that are one node [rad] (default 1.2)."),
@@ -194,7 +201,7 @@ def build(
     role: RoleOption = None,
 ) -> None:
     """Build a library: clips, contacts, effective hits and the motion graph, in one file."""
-    from kumite.annotate import read_actions
+    from kumite.annotate import read_actions, read_avoidance
     from kumite.files import refuse_unwritable
     from kumite.graph import build_action_library, build_library, save_library
 
@@ -202,20 +209,25 @@ def build(
         level,
         {
             "frames": {"--event": event, "--per-second": per_second},
-            "actions": {"--actions": actions, "--alike": alike, "--most-ways": most_ways},
+            "actions": {
+                "--actions": None if avoidance else actions,
+                "--alike": alike,
+                "--most-ways": most_ways,
+            },
         },
     )
     refuse_unwritable(output)  # before the work, not after
     loaded = _load_clips(source, fps, file_fps, metres_per_unit, up_axis, ground, role)
     with progress() as bars:
         stages, clips = Stages(bars), loaded.clip_set()
+        parts = read_avoidance(actions, clips) if avoidance and actions else avoidance
         if level == "frames":
             given = _given(event=event, per_second=per_second)
-            library = build_library(clips, **given, progress=stages)
+            library = build_library(clips, **given, avoidance=parts, progress=stages)
         else:
             mine = None if actions is None else read_actions(actions, clips)
             given = _given(alike=alike, most_ways=most_ways)
-            library = build_action_library(clips, mine, **given, progress=stages)
+            library = build_action_library(clips, mine, **given, avoidance=parts, progress=stages)
     save_library(output, library)
     if as_json:
         print_json({**library_values(library), "output": str(output)})

@@ -48,7 +48,7 @@ def segment(
     role: RoleOption = None,
 ) -> None:
     """Cut clips into actions: a text file to edit. Run it again as often as you like."""
-    from kumite.annotate import find_actions, find_contacts, find_strikes
+    from kumite.annotate import find_actions, find_avoidance, find_contacts, find_strikes
     from kumite.annotate.action_file import check, merge, parse, to_lines, write
     from kumite.clip import Clip, concatenate
     from kumite.files import refuse_unwritable
@@ -73,22 +73,25 @@ def segment(
     sets = [concatenate(group) for group in groups]
     if known is not None:
         check(output, known, sets)
-    found = []
+    found, avoidance = [], []
     with progress() as bars:
         stage = Stages(bars)
         for clips in sets:
             stage(f"cutting {len(clips.names)} clips")
-            found.append(find_actions(clips, find_contacts(clips), find_strikes(clips)))
-    lines = [line for clips, actions in zip(sets, found) for line in to_lines(actions, clips)]
+            contacts = find_contacts(clips)
+            found.append(find_actions(clips, contacts, find_strikes(clips)))
+            avoidance.append(find_avoidance(clips, contacts, actions=found[-1]))
+    lines = [line for one in zip(found, sets, avoidance) for line in to_lines(*one)]
     content, kept = merge(known, lines, sets)
     write(output, content)
-    scored = _scored(sets, found, truth) if score else {}
+    scored = _scored(sets, found, avoidance, truth) if score else {}
     if as_json:
         print_json(
             {
                 "output": str(output),
                 "clips": sum(len(s.names) for s in sets),
                 "actions": kept.written + kept.lines,
+                "avoidance_parts": kept.parts,
                 "kept_lines": kept.lines,
                 "kept_gaps": kept.gaps,
                 "kept_comments": kept.comments,
@@ -98,7 +101,7 @@ def segment(
         )
         return
     out.print(
-        f"wrote {output}: {kept.written + kept.lines} actions of "
+        f"wrote {output}: {kept.written + kept.lines} actions and {kept.parts} avoidance parts of "
         f"{sum(len(s.names) for s in sets)} clips",
         markup=False,
         highlight=False,
@@ -113,20 +116,30 @@ def segment(
         _print_score(scored)
 
 
-def _scored(sets: Sequence[Any], found: Sequence[Any], truth: dict[str, Any]) -> dict[str, Any]:
+def _scored(
+    sets: Sequence[Any], found: Sequence[Any], avoidance: Sequence[Any], truth: dict[str, Any]
+) -> dict[str, Any]:
     """Scores as plain values: against truth, where there is one, else the kinds in each clip."""
     from kumite.annotate import KINDS
-    from kumite.annotate.action_score import kind_shares, score_actions
+    from kumite.annotate.action_score import kind_shares, score_actions, score_avoidance
 
     if truth:
-        (clips,), (actions,) = sets, found
-        s = score_actions(clips, actions, [truth[name] for name in clips.names])
+        (clips,), (actions,), (found_parts,) = sets, found, avoidance
+        true = [truth[name] for name in clips.names]
+        s = score_actions(clips, actions, true)
+        parts = score_avoidance(clips, found_parts, true)
         return {
             "boundaries": {
                 "true": s.true,
                 "found": s.found,
                 "precision": round(s.precision, 4),
                 "recall": round(s.recall, 4),
+            },
+            "avoidance": {
+                "true": parts.true,
+                "found": parts.found,
+                "precision": round(parts.precision, 4),
+                "recall": round(parts.recall, 4),
             },
             "kinds_right": round(s.kinds_right, 4),
             "confusion": {
@@ -153,6 +166,14 @@ def _print_score(scored: dict[str, Any]) -> None:
             markup=False,
             highlight=False,
         )
+        a = scored["avoidance"]
+        if a["true"] or a["found"]:
+            out.print(
+                f"avoidance parts: {a['true']} true, {a['found']} found, "
+                f"precision {a['precision']:.3f}, recall {a['recall']:.3f}",
+                markup=False,
+                highlight=False,
+            )
     rows = scored.get("confusion") or scored["kinds"]
     true = "confusion" in scored
     table = Table(title="true kinds (rows), found kinds" if true else "kinds found, share of clip")

@@ -29,10 +29,13 @@ def builtin_library(
     """The built-in performer's motion graph, kept in ``cache`` under the code that makes it.
 
     level: a graph of ``frames`` (:func:`build_library`), without reactions, or of whole ``actions``
-    (:func:`build_action_library`), with them. Errors: an unknown style or level.
+    (:func:`build_action_library`), with them. Of the style avoidance the avoidance parts are kept
+    whole, and frames are joined at either foot's lift-off: a way out is then never far. Errors: an
+    unknown style or level.
     """
     if level not in LEVELS:
         raise unknown("level", level, LEVELS)
+    avoids = style == "avoidance"
     key = code_digest("performer", "body", "annotate", "graph", "clip", "rotation", "kernels")
     path = None if cache is None else cache / f"performer-{style}-{level}-{key}.kumite"
     if path is not None and path.exists():
@@ -41,9 +44,12 @@ def builtin_library(
     progress("performing")
     made = performer.performed(style, mirrored=False, cache=cache)
     if level == "frames":
-        library = build_library(concatenate(_voluntary(made), FPS), progress=progress)
+        clips = concatenate(_voluntary(made), FPS)
+        event = "both" if avoids else "left"
+        library = build_library(clips, event=event, avoidance=avoids, progress=progress)
     else:
-        library = build_action_library(concatenate(list(made.clips), FPS), progress=progress)
+        clips = concatenate(list(made.clips), FPS)
+        library = build_action_library(clips, avoidance=avoids, progress=progress)
     if path is not None:
         with contextlib.suppress(KumiteError):  # a cache that cannot be written only costs time
             save_library(path, library)

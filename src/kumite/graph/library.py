@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,16 @@ from typing import Any
 import numpy as np
 
 from kumite import files
-from kumite.annotate import Actions, Contacts, Strikes, find_contacts, find_strikes
+from kumite.annotate import (
+    Actions,
+    AvoidanceParts,
+    Contacts,
+    Strikes,
+    find_avoidance,
+    find_contacts,
+    find_strikes,
+    no_avoidance,
+)
 from kumite.clip import ClipSet, Skeleton
 from kumite.errors import KumiteError
 from kumite.graph.distance import pose_features
@@ -25,7 +34,9 @@ from kumite.graph.transitions import (
 )
 
 KIND = "library"
-VERSION = 3
+VERSION = 4
+
+_NO_PARTS = no_avoidance(np.zeros(1, np.int64))  # of clips that are not known yet
 
 
 @dataclass(frozen=True)
@@ -38,9 +49,14 @@ class Library:
     table: ActionTable
     report: dict[str, Any] = field(default_factory=dict)  # how it was built, JSON values
     actions: Actions | None = None  # what the stretches of an action-level graph are
+    avoidance: AvoidanceParts = _NO_PARTS  # kept whole in the graph; none unless it was asked for
 
     def __post_init__(self) -> None:
         frames = len(self.clips)
+        if len(self.avoidance) == 0:
+            object.__setattr__(self, "avoidance", no_avoidance(self.clips.clip_start))
+        if not np.array_equal(self.avoidance.clip_start, self.clips.clip_start):
+            raise KumiteError("library: its avoidance parts are of other clips")
         for what, found in (
             ("contacts", len(self.contacts.on_ground)),
             ("strikes", len(self.strikes.effective)),
@@ -68,6 +84,14 @@ class Library:
         return np.searchsorted(self.actions.start, self.table.first, side="right") - 1
 
     @cached_property
+    def parts_of_stretch(self) -> tuple[np.ndarray, np.ndarray]:
+        """The avoidance parts that stretches play, as CSR: those of stretch l are
+        ``part[begin[l]:begin[l + 1]]``, in order (begin [L + 1], part [K]). One of which a stretch
+        has only some frames is not among them.
+        """
+        return self.avoidance.within(self.table.first, self.table.last)
+
+    @cached_property
     def digest(self) -> str:
         """16 hex digits that name the content: what is computed from it is cached under them."""
         h = hashlib.sha256(f"{VERSION}{self.clips.fps}{self.clips.skeleton.names}".encode())
@@ -82,15 +106,19 @@ def build_library(
     event: str = "left",
     per_second: float = PER_SECOND,
     largest_share: float = LARGEST_SHARE,
+    avoidance: AvoidanceParts | bool = False,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> Library:
     """Notes, transitions, component and action table of a set of clips.
 
-    progress is told each stage as it begins. Errors: too few frames; no such contact event.
+    avoidance: parts to keep whole, each within one action of the table (Oshita & Masaoka 2011,
+    section 3.1); True: as they are found; False: none. progress is told each stage as it begins.
+    Errors: too few frames; no such contact event; parts of other clips.
     """
     progress("finding contacts and effective hits")
     contacts = find_contacts(clips)
     strikes = find_strikes(clips)
+    parts = chosen_parts(clips, contacts, avoidance, progress)
     progress("comparing poses")
     features = pose_features(clips)
     transitions = find_transitions(
@@ -100,6 +128,7 @@ def build_library(
         per_second=per_second,
         largest_share=largest_share,
         features=features,
+        whole=parts,
     )
     progress("folding the graph")
     kept = strongest_component(clips, transitions)
@@ -123,7 +152,34 @@ def build_library(
         "hits": len(strikes),
         "hits_kept": int(kept[strikes.frame].sum()),
     }
-    return Library(clips, contacts, strikes, table, report)
+    return with_parts(Library(clips, contacts, strikes, table, report, None, parts), avoidance)
+
+
+def chosen_parts(
+    clips: ClipSet,
+    contacts: Contacts,
+    avoidance: AvoidanceParts | bool,
+    progress: Callable[[str], None],
+    actions: Actions | None = None,
+) -> AvoidanceParts:
+    """The parts that a graph is to keep whole. Errors: parts of other clips."""
+    if avoidance is False:
+        return no_avoidance(clips.clip_start)
+    if avoidance is True:
+        progress("finding avoidance parts")
+        return find_avoidance(clips, contacts, actions=actions)
+    if not np.array_equal(avoidance.clip_start, clips.clip_start):
+        raise KumiteError("avoidance parts: of other clips")
+    return avoidance
+
+
+def with_parts(library: Library, avoidance: AvoidanceParts | bool) -> Library:
+    """The library, its report with a count of avoidance parts where they were asked for."""
+    if avoidance is False:
+        return library
+    held = len(np.unique(library.parts_of_stretch[1]))
+    count = {"avoidance_parts": len(library.avoidance), "avoidance_parts_kept": held}
+    return replace(library, report={**library.report, **count})
 
 
 def _group(prefix: str, record: Any) -> dict[str, np.ndarray]:
@@ -143,6 +199,8 @@ def _arrays(library: Library) -> dict[str, np.ndarray]:
         **_group("contacts", library.contacts),
         **_group("strikes", library.strikes),
         **_group("table", library.table),
+        "avoidance.start": library.avoidance.start,
+        "avoidance.stop": library.avoidance.stop,
         **({} if library.actions is None else _action_arrays(library.actions)),
     }
 
@@ -194,6 +252,7 @@ def load_library(path: Path | str) -> Library:
             else Actions(
                 label=tuple(header["labels"]), clip_start=clips.clip_start, **part("actions")
             ),
+            AvoidanceParts(clip_start=clips.clip_start, **part("avoidance")),
         )
     except (KeyError, TypeError, ValueError, KumiteError) as error:
         raise KumiteError(f"{path}: damaged library ({error})") from None

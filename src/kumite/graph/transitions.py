@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from kumite.annotate import Contacts
+from kumite.annotate import AvoidanceParts, Contacts
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError, unknown
 from kumite.graph.distance import PoseFeatures, pose_features
@@ -50,10 +50,12 @@ def find_transitions(
     per_second: float = PER_SECOND,
     largest_share: float = LARGEST_SHARE,
     features: PoseFeatures | None = None,
+    whole: AvoidanceParts | None = None,
 ) -> Transitions:
     """The best transitions, about ``per_second`` for each second of capture.
 
-    Errors: an unknown event; no such event in the clips.
+    whole: parts of the clips that no transition enters behind their first frame, or leaves before
+    their last. Errors: an unknown event; no such event in the clips.
     """
     if event not in EVENTS:
         raise unknown("event", event, EVENTS)
@@ -61,6 +63,11 @@ def find_transitions(
         raise KumiteError(f"per_second {per_second}; expected more than 0 transitions a second")
     features = features or pose_features(clips)
     frames, group = _candidate_frames(clips, contacts, event)
+    if whole is not None:
+        # Who leaves from frame i leaves out i + 1; who joins at i plays i + 1 first: of a part both
+        # must not be, unless it is its first frame.
+        free = ~whole.inner[frames + 1]
+        frames, group = frames[free], group[free]
     if len(frames) < 2:
         raise KumiteError(
             f"too few frames for a graph: {len(clips)} frames in {len(clips.names)} clip(s) hold "

@@ -22,16 +22,18 @@ from kumite.annotate import (
     DIRECTIONS,
     KINDS,
     Actions,
+    AvoidanceParts,
     find_actions,
     find_contacts,
     find_strikes,
     only_blows,
     shorter_rests,
 )
+from kumite.annotate.action_file import SLIVER
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError
 from kumite.graph.distance import pose_features
-from kumite.graph.library import Library
+from kumite.graph.library import Library, chosen_parts, with_parts
 from kumite.graph.table import ActionTable
 from kumite.kernels import distance as kernels
 from kumite.rotation import planar_compose, planar_inverse
@@ -49,6 +51,7 @@ def build_action_library(
     *,
     alike: float = ALIKE,
     most_ways: int = MOST_WAYS,
+    avoidance: AvoidanceParts | bool = False,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> Library:
     """Notes and the action-level graph of a set of clips.
@@ -56,7 +59,9 @@ def build_action_library(
     actions: of these clips, by default as the motion analyser finds them. alike: how far [rad]
     poses of one node may be apart. most_ways: actions that a state offers at most; of more those of
     each label that join best, label by label in turn, so that a large capture gives smoother joins
-    and not only more of the same. Errors: no connected part with two actions that can be chosen.
+    and not only more of the same. avoidance: parts that no action's end may cut: the action in
+    which the middle of one lies plays all of it (:func:`uncut`); True: as they are found; False:
+    none. Errors: no connected part with two actions that can be chosen.
     """
     if most_ways < 2:
         raise KumiteError(f"most_ways {most_ways}; expected at least 2")
@@ -69,7 +74,9 @@ def build_action_library(
         actions = find_actions(clips, contacts, strikes)
     elif not np.array_equal(actions.clip_start, clips.clip_start):
         raise KumiteError("actions: of other clips")
+    parts = chosen_parts(clips, contacts, avoidance, progress, actions)
     actions = shorter_rests(actions, REST * clips.fps)
+    actions = uncut(actions, parts, round(SLIVER * clips.fps))
     attack = np.flatnonzero(actions.kind == KINDS.index("attack"))
     which = np.searchsorted(actions.start[attack], strikes.frame, side="right") - 1
     strikes = only_blows(
@@ -135,7 +142,35 @@ def build_action_library(
         "hits_kept": _inside(strikes.frame, first, state_frame),
         **{f"{kind}s": int(np.sum(keep & (actions.kind == k))) for k, kind in enumerate(KINDS)},
     }
-    return Library(clips, contacts, strikes, table, report, actions)
+    return with_parts(Library(clips, contacts, strikes, table, report, actions, parts), avoidance)
+
+
+def uncut(actions: Actions, parts: AvoidanceParts, shortest: int = 1) -> Actions:
+    """The same actions, but none begins or ends within a part: the one in which the middle of a
+    part lies takes all of it from its neighbours, and a neighbour of which less than ``shortest``
+    frames are left joins it. A part whose middle lies in no action is none's, and cuts none.
+    """
+    start, stop = actions.start.copy(), actions.stop.copy()
+    owners = np.searchsorted(actions.start, (parts.start + parts.stop - 1) // 2, side="right") - 1
+    for a, b, k in zip(parts.start.tolist(), parts.stop.tolist(), owners.tolist()):
+        if k < 0 or (a + b - 1) // 2 >= actions.stop[k]:
+            continue
+        start[k], stop[k] = min(start[k], a), max(stop[k], b)
+        stop[:k] = np.minimum(stop[:k], a)
+        start[k + 1 :] = np.maximum(start[k + 1 :], b)
+    cut = (start != actions.start) | (stop != actions.stop)
+    cut[owners[owners >= 0]] = False
+    for k in np.flatnonzero(cut & (stop - start < shortest) & (stop > start)).tolist():
+        # It touches the action that has taken from it: before it where its start moved, else after.
+        if start[k] != actions.start[k]:
+            stop[(stop == start[k]) & (start < stop)] = stop[k]
+        else:
+            start[(start == stop[k]) & (start < stop)] = start[k]
+        start[k] = stop[k]
+    keep = np.flatnonzero(start < stop)
+    kind, limb, way = actions.kind[keep], actions.limb[keep], actions.direction[keep]
+    label = tuple(actions.label[k] for k in keep.tolist())
+    return Actions(start[keep], stop[keep], kind, limb, way, label, actions.clip_start)
 
 
 def _recovered(actions: Actions, on_ground: np.ndarray, fps: float) -> Actions:
