@@ -28,8 +28,8 @@ def library_values(library: Library) -> dict[str, Any]:
     """What a library holds, as JSON values: how it was built, then what is counted here."""
     clips = library.clips
     values = {
-        **library.report,
         "level": "frames" if library.actions is None else "actions",
+        **library.report,
         "clips": len(clips.names),
         "avoidance_parts": len(library.avoidance),
     }

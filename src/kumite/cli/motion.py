@@ -160,7 +160,11 @@ def build(
     source: Source,
     output: Annotated[Path, typer.Option("--output", "-o", help="The library file to write.")],
     level: Annotated[
-        str, typer.Option(help="A graph of frames, or of whole actions (kumite segment).")
+        str,
+        typer.Option(
+            help="A graph of frames, of whole actions (kumite segment), or one in which an "
+            "avoidance can soon be begun."
+        ),
     ] = "frames",
     event: Annotated[
         str | None,
@@ -177,7 +181,7 @@ def build(
         Path | None,
         typer.Option(
             help="The text file of 'kumite segment', for its actions (--level actions) and its "
-            "avoidance parts (--avoidance); default: as found."
+            "avoidance parts (--avoidance, --level avoidance); default: as found."
         ),
     ] = None,
     avoidance: Annotated[
@@ -192,6 +196,14 @@ def build(
         int | None,
         typer.Option(help="Actions: as many are offered after one at most (default 64)."),
     ] = None,
+    every: Annotated[
+        float | None,
+        typer.Option(help="Avoidance: an avoidance may be begun so often [s] (default 0.2)."),
+    ] = None,
+    offered: Annotated[
+        int | None,
+        typer.Option(help="Avoidance: as many of them are offered then at most (default 16)."),
+    ] = None,
     as_json: JsonOption = False,
     fps: FpsOption = None,
     file_fps: FileFpsOption = None,
@@ -203,8 +215,14 @@ def build(
     """Build a library: clips, contacts, effective hits and the motion graph, in one file."""
     from kumite.annotate import read_actions, read_avoidance
     from kumite.files import refuse_unwritable
-    from kumite.graph import build_action_library, build_library, save_library
+    from kumite.graph import (
+        build_action_library,
+        build_avoidance_library,
+        build_library,
+        save_library,
+    )
 
+    avoidance = avoidance or level == "avoidance"
     _refuse_of_another_level(
         level,
         {
@@ -214,6 +232,7 @@ def build(
                 "--alike": alike,
                 "--most-ways": most_ways,
             },
+            "avoidance": {"--every": every, "--offered": offered},
         },
     )
     refuse_unwritable(output)  # before the work, not after
@@ -224,6 +243,9 @@ def build(
         if level == "frames":
             given = _given(event=event, per_second=per_second)
             library = build_library(clips, **given, avoidance=parts, progress=stages)
+        elif level == "avoidance":
+            given = _given(every=every, offered=offered)
+            library = build_avoidance_library(clips, parts, **given, progress=stages)
         else:
             mine = None if actions is None else read_actions(actions, clips)
             given = _given(alike=alike, most_ways=most_ways)

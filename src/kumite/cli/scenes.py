@@ -40,19 +40,26 @@ CountOption = Annotated[
 ]
 
 
-def _settings(scene: str, count: int | None) -> Any:
+ThrowsOption = Annotated[
+    int | None, typer.Option(help="How many balls are thrown in a scene with dodgers.")
+]
+
+
+def _settings(scene: str, count: int | None, throws: int | None) -> Any:
     """The scene as it is to be run."""
-    from kumite.scene import load_scene, with_count
+    from kumite.scene import load_scene, with_count, with_throws
 
     settings = load_scene(scene)
-    return settings if count is None else with_count(settings, count)
+    settings = settings if count is None else with_count(settings, count)
+    return settings if throws is None else with_throws(settings, throws)
 
 
 def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
     """A scene ready to run: library read or performed, policies trained or found."""
     from kumite.control import cache_folder
     from kumite.graph import builtin_library, load_library
-    from kumite.scene import BoutScene, LiveScene
+    from kumite.scene import BoutScene, DodgeScene, LiveScene
+    from kumite.scene.dodge import DodgeSettings
     from kumite.scene.fighters import BoutSettings
 
     cache = cache_folder(library)
@@ -63,9 +70,13 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
             found = load_library(library)
         else:
             bout = settings.bout or BoutSettings()
-            level = "actions" if settings.fighters else "frames"
-            found = builtin_library(cache, progress=stages, style=bout.library, level=level)
+            style, level = bout.library, "actions" if settings.fighters else "frames"
+            if settings.dodging:
+                style, level = (settings.dodge or DodgeSettings()).library, "avoidance"
+            found = builtin_library(cache, progress=stages, style=style, level=level)
         stages("preparing the scene")
+        if settings.dodging:
+            return DodgeScene(settings, found, seed=seed)
         if settings.fighters:
             return BoutScene(settings, found, seed=seed)
         return LiveScene(settings, found, seed=seed, cache=cache, progress=Training(bars))
@@ -77,6 +88,7 @@ def run(
     library: LibraryOption = None,
     seconds: Annotated[float, typer.Option(help="How long [s].")] = 30.0,
     count: CountOption = None,
+    throws: ThrowsOption = None,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same bytes.")] = 0,
     output: Annotated[
         list[Path] | None,
@@ -87,8 +99,8 @@ def run(
     """Run a scene without drawing, record it, and print how good it is."""
     from kumite.scene import measure, record
 
-    settings = _settings(scene, count)  # before any long work: what is wrong is said at once
-    names = [c.name for c in (*settings.character, *settings.fighters)]
+    settings = _settings(scene, count, throws)  # before any long work: what is wrong is said at once
+    names = [c.name for c in (*settings.character, *settings.fighters, *settings.dodging)]
     _check_outputs(output or [], [*names, *(["the crowd"] if settings.crowd else [])])
     live = _live_scene(settings, library, seed)
     with progress() as bars:
@@ -229,6 +241,7 @@ def studio(
     ] = "sparring",
     library: LibraryOption = None,
     count: CountOption = None,
+    throws: ThrowsOption = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the scene.")] = 0,
     host: Annotated[
         str, typer.Option(help="Address to listen on; others than 127.0.0.1 let others in.")
@@ -250,7 +263,7 @@ def studio(
                 f"DEMO_SECONDS={os.environ['DEMO_SECONDS']!r}: expected a number of seconds"
             ) from None
     serve(
-        _stage(scene, library, count, seed),
+        _stage(scene, library, count, throws, seed),
         host=host,
         port=8080 if port is None else port,
         strict_port=port is not None,
@@ -260,7 +273,9 @@ def studio(
     )
 
 
-def _stage(scene: str, library: Path | None, count: int | None, seed: int) -> Any:
+def _stage(
+    scene: str, library: Path | None, count: int | None, throws: int | None, seed: int
+) -> Any:
     """What the studio is to show."""
     from kumite.graph import load_library
     from kumite.scene import ActionPlayback, Playback, load_recording
@@ -268,8 +283,8 @@ def _stage(scene: str, library: Path | None, count: int | None, seed: int) -> An
     if scene.endswith(".rec"):
         return Playback(load_recording(scene))
     if not is_library(scene):
-        return _live_scene(_settings(scene, count), library, seed)
-    for name, value in (("--library", library), ("--count", count)):
+        return _live_scene(_settings(scene, count, throws), library, seed)
+    for name, value in (("--library", library), ("--count", count), ("--throws", throws)):
         if value is not None:
             raise KumiteError(f"{name}: of a scene; {scene} is a library, whose actions are played")
     found = load_library(scene)

@@ -32,7 +32,7 @@ MOST_PATHS = 50_000  # candidates of one search; more are counted, not weighed
 
 
 @dataclass(frozen=True)
-class AvoidanceSettings:
+class AvoidanceRules:
     """The paper's numbers, by its names in the comments, and ours."""
 
     window: float = 1.0  # s, T_window: how far the avoidance may be from the attack as captured
@@ -154,17 +154,17 @@ class AvoidanceSearch:
     def __init__(
         self,
         library: Library,
-        settings: AvoidanceSettings | None = None,
+        settings: AvoidanceRules | None = None,
         *,
         spheres: Spheres | None = None,
     ) -> None:
         """spheres: the body's volume; by default laid to cover it. Errors: no part to avoid with."""
-        self.library, self.settings = library, settings or AvoidanceSettings()
+        self.library, self.settings = library, settings or AvoidanceRules()
         clips = library.clips
         self.spheres = spheres or lay_spheres(clips.skeleton)
         self.volumes = _volumes(clips, self.spheres)
         parts = library.avoidance
-        part_of, which = parts_of_stretches(library)
+        part_of, which = library.parts_of_stretch
         if len(which) == 0:
             raise KumiteError(
                 "the library has no avoidance parts in its graph: nobody in it can avoid anything; "
@@ -358,17 +358,6 @@ def _volumes(clips: ClipSet, spheres: Spheres) -> kernels.Volumes:
         reach = np.linalg.norm(some - middle[:, :, None], axis=1) + radius[low:high]
         bound[:, :3, g], bound[:, 3, g] = middle, reach.max(axis=1) + 1e-5  # float32's rounding
     return kernels.Volumes(centre, radius, group, bound)
-
-
-def parts_of_stretches(library: Library) -> tuple[np.ndarray, np.ndarray]:
-    """Avoidance parts in CSR by stretch, [L + 1] and [A]: those that a stretch plays whole."""
-    parts, table = library.avoidance, library.table
-    low = np.searchsorted(parts.start, table.first - 1)
-    high = np.searchsorted(parts.stop, table.last + 1, side="right")
-    counts = np.maximum(high - low, 0)
-    part_of = np.concatenate([[0], np.cumsum(counts)])
-    which = np.arange(part_of[-1]) - np.repeat(part_of[:-1], counts) + np.repeat(low, counts)
-    return part_of, which.astype(np.int64)
 
 
 def fastest_end_effector(library: Library) -> np.ndarray:

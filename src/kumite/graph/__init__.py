@@ -1,5 +1,6 @@
 """The motion graph: pose distance, transitions, components, the action table, the library file."""
 
+from kumite.graph.avoiding import build_avoidance_library, find_avoiding_transitions
 from kumite.graph.builtin import builtin_library
 from kumite.graph.distance import PoseFeatures, pose_features
 from kumite.graph.library import Library, build_library, load_library, save_library
@@ -13,8 +14,10 @@ __all__ = [
     "PoseFeatures",
     "Transitions",
     "build_action_library",
+    "build_avoidance_library",
     "build_library",
     "builtin_library",
+    "find_avoiding_transitions",
     "find_transitions",
     "fold",
     "load_library",

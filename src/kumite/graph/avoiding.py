@@ -9,12 +9,15 @@ way into another, so that paths that only rest or walk do not multiply.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from kumite.annotate import AvoidanceParts
+from kumite.annotate import AvoidanceParts, find_contacts, find_strikes
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError
 from kumite.graph.distance import PoseFeatures, pose_features
+from kumite.graph.library import Library, chosen_parts, folded, with_parts
 from kumite.graph.transitions import Transitions
 from kumite.kernels import distance as kernels
 from kumite.rotation import planar_apply, planar_inverse
@@ -29,6 +32,31 @@ FEWEST = 2  # … but every frame keeps its best so many ways into an avoidance
 UNLIKE = 0.10  # m, root mean square: avoidances nearer to each other than that are alike
 ROLES = ("head", "chest", "pelvis", "left_hand", "right_hand", "left_foot", "right_foot")
 _SPARE = 8  # rows that the kernel may write beyond the last
+
+
+def build_avoidance_library(
+    clips: ClipSet,
+    avoidance: AvoidanceParts | bool = True,
+    *,
+    every: float = EVERY,
+    offered: int = OFFERED,
+    worst: float = WORST,
+    progress: Callable[[str], None] = lambda stage: None,
+) -> Library:
+    """A library whose graph is made of :func:`find_avoiding_transitions`.
+
+    avoidance: its parts; True: as they are found. Errors: there are none.
+    """
+    progress("finding contacts and effective hits")
+    contacts, strikes = find_contacts(clips), find_strikes(clips)
+    parts = chosen_parts(clips, contacts, avoidance, progress)
+    progress("comparing poses")
+    transitions = find_avoiding_transitions(
+        clips, parts, every=every, offered=offered, worst=worst
+    )
+    progress("folding the graph")
+    told = {"level": "avoidance", "every": every, "offered": offered, "worst": worst}
+    return with_parts(folded(clips, contacts, strikes, transitions, parts, told), avoidance)
 
 
 def find_avoiding_transitions(
@@ -54,7 +82,7 @@ def find_avoiding_transitions(
         )
     features = features or pose_features(clips)
     fps, clip = clips.fps, clips.clip_of_frame
-    inside = _inside(len(clips), parts)
+    inside = _inside(parts)
     step, change = max(1, round(every * fps)), round(CHANGE_EVERY * fps)
     since = np.arange(len(clips)) - clips.clip_start[clip]
     ends = np.zeros(len(clips), dtype=bool)
@@ -108,12 +136,9 @@ def find_avoiding_transitions(
     )
 
 
-def _inside(frames: int, parts: AvoidanceParts) -> np.ndarray:
+def _inside(parts: AvoidanceParts) -> np.ndarray:
     """Frames [F] after which the part they are in goes on."""
-    edges = np.zeros(frames + 1, dtype=np.int64)
-    np.add.at(edges, parts.start, 1)
-    np.add.at(edges, parts.stop - 1, -1)
-    return np.cumsum(edges[:-1]) > 0
+    return np.append(parts.inner[1:], False)
 
 
 def _lasts(parts: AvoidanceParts, frames: int) -> np.ndarray:

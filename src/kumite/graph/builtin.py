@@ -10,13 +10,14 @@ from kumite import performer
 from kumite.clip import Clip, concatenate
 from kumite.errors import KumiteError, unknown
 from kumite.files import code_digest
+from kumite.graph.avoiding import build_avoidance_library
 from kumite.graph.library import Library, build_library, load_library, save_library
 from kumite.graph.whole import build_action_library
 
 FPS = 60.0
 
 
-LEVELS = ("frames", "actions")
+LEVELS = ("frames", "actions", "avoidance")
 
 
 def builtin_library(
@@ -29,7 +30,8 @@ def builtin_library(
     """The built-in performer's motion graph, kept in ``cache`` under the code that makes it.
 
     level: a graph of ``frames`` (:func:`build_library`), without reactions, or of whole ``actions``
-    (:func:`build_action_library`), with them. Of the style avoidance the avoidance parts are kept
+    (:func:`build_action_library`), with them, or one from which an ``avoidance`` is soon reached
+    (:func:`build_avoidance_library`), without. Of the style avoidance the avoidance parts are kept
     whole, and frames are joined at either foot's lift-off: a way out is then never far. Errors: an
     unknown style or level.
     """
@@ -47,6 +49,8 @@ def builtin_library(
         clips = concatenate(_voluntary(made), FPS)
         event = "both" if avoids else "left"
         library = build_library(clips, event=event, avoidance=avoids, progress=progress)
+    elif level == "avoidance":
+        library = build_avoidance_library(concatenate(_voluntary(made), FPS), progress=progress)
     else:
         clips = concatenate(list(made.clips), FPS)
         library = build_action_library(clips, avoidance=avoids, progress=progress)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -29,6 +29,7 @@ from kumite.graph.table import ActionTable, fold
 from kumite.graph.transitions import (
     LARGEST_SHARE,
     PER_SECOND,
+    Transitions,
     find_transitions,
     strongest_component,
 )
@@ -130,14 +131,28 @@ def build_library(
         features=features,
         whole=parts,
     )
+    told = {"event": event, "per_second": per_second, "largest_share": largest_share}
     progress("folding the graph")
+    library = folded(clips, contacts, strikes, transitions, parts, told)
+    return with_parts(library, avoidance)
+
+
+def folded(
+    clips: ClipSet,
+    contacts: Contacts,
+    strikes: Strikes,
+    transitions: Transitions,
+    parts: AvoidanceParts,
+    told: Mapping[str, Any],
+) -> Library:
+    """The library of the connected part of a graph of frames. told: how its transitions were found,
+    for the report. Errors: too few frames.
+    """
     kept = strongest_component(clips, transitions)
     table = fold(clips, transitions, kept)
     jumps = table.join_cost[table.join_cost > 0]
     report = {
-        "event": event,
-        "per_second": per_second,
-        "largest_share": largest_share,
+        **told,
         "fps": clips.fps,
         "frames": len(clips),
         "frames_kept": int(kept.sum()),
@@ -152,7 +167,7 @@ def build_library(
         "hits": len(strikes),
         "hits_kept": int(kept[strikes.frame].sum()),
     }
-    return with_parts(Library(clips, contacts, strikes, table, report, None, parts), avoidance)
+    return Library(clips, contacts, strikes, table, report, None, parts)
 
 
 def chosen_parts(

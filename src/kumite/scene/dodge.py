@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from kumite.body import lay_body
-from kumite.control.avoidance import AvoidanceSearch, AvoidanceSettings
+from kumite.control.avoidance import AvoidanceSearch, AvoidanceRules
 from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.scene.balls import Balls, BallsSettings, aimed, capsules_of, velocity_to
@@ -52,7 +52,7 @@ class DodgersSettings(Settings):
 
 
 class DodgeSettings(Settings):
-    """How they search; names as in :class:`~kumite.control.avoidance.AvoidanceSettings`."""
+    """How they search; names as in :class:`~kumite.control.avoidance.AvoidanceRules`."""
 
     library: Literal["avoidance", "boxing"] = "avoidance"  # of the built-in performer
     window: Annotated[Finite, Field(gt=0, le=10)] = 1.0  # s
@@ -65,8 +65,8 @@ class DodgeSettings(Settings):
     index: bool = True
     culling: bool = True
 
-    def search(self) -> AvoidanceSettings:
-        return AvoidanceSettings(
+    def search(self) -> AvoidanceRules:
+        return AvoidanceRules(
             window=self.window,
             weights=(self.avoidance, self.body, self.timescale),
             clearance=self.clearance,

@@ -260,6 +260,19 @@ def with_count(settings: SceneSettings, count: int) -> SceneSettings:
     return SceneSettings.model_construct(**{**dict(settings), part: changed})
 
 
+def with_throws(settings: SceneSettings, throws: int) -> SceneSettings:
+    """The scene with another number of balls thrown by its seed.
+
+    Errors: nobody in it avoids anything; a number below 0.
+    """
+    if not settings.dodging:
+        raise KumiteError(f"throws: nobody avoids in {settings.title!r}; expected [[dodger]]s")
+    if not 0 <= throws <= 100_000:
+        raise KumiteError(f"throws: {throws}, expected from 0 to 100000")
+    balls = (settings.balls or BallsSettings()).model_copy(update={"throws": throws})
+    return SceneSettings.model_construct(**{**dict(settings), "balls": balls})
+
+
 def builtin_scenes() -> dict[str, SceneSettings]:
     """The scenes that come with Kumite, by name."""
     folder = resources.files("kumite.scene") / "builtin"
