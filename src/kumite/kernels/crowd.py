@@ -20,8 +20,9 @@ from kumite.kernels.blow import (
     squareness,
     swept_contact,
 )
-from kumite.kernels.character import begin, planar_point, show_one, turned
+from kumite.kernels.character import begin, planar_point, show_one
 from kumite.kernels.jit import kernel, parallel_kernel, plugged
+from kumite.kernels.limb import turned
 from kumite.kernels.look_ahead import look_ahead, look_further
 from kumite.kernels.near import fill_hash, nearest
 from kumite.kernels.policy import carry, wrapped
