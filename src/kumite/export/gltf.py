@@ -83,6 +83,7 @@ def _at_rate(recording: Recording, fps: float) -> Recording:
         wxyz=slerp(recording.wxyz[before], recording.wxyz[after], part),
         contacts=recording.contacts[before],
         library_frame=recording.library_frame[before],
+        rate=None if recording.rate is None else recording.rate[before],
         object_position=between(recording.object_position),
         events=(),
     )

@@ -1,10 +1,11 @@
 """Characters played from a library, all K at once: joins, inertialisation, foot lock, pose.
 
-A character shows library frame f under an anchor, the planar transform from the library's world to
-the scene's. At a join the anchor changes so that the facing frame stays, and what is left of the
-difference (joint rotations, height, velocities) becomes an offset that a critically damped spring
-takes to zero: pose and velocity are continuous. A planted foot does not take part in that: its
-offset stays while it bears weight, and fades while it is in the air.
+A character shows library frame f, or a phase on the way to the next (:mod:`kumite.kernels.phase`),
+under an anchor, the planar transform from the library's world to the scene's. At a join the anchor
+changes so that the facing frame stays, and what is left of the difference (joint rotations, height,
+velocities) becomes an offset that a critically damped spring takes to zero: pose and velocity are
+continuous. A planted foot does not take part in that: its offset stays while it bears weight, and
+fades while it is in the air.
 
 Shapes: K characters, J joints, F frames. Rotation offsets are rotation vectors in joint axes.
 """
@@ -17,11 +18,18 @@ import numpy as np
 from numba import prange
 
 from kumite.kernels.jit import kernel, parallel_kernel
+from kumite.kernels.limb import pose_joint, product, reach
+from kumite.kernels.phase import (
+    AT_FRAME,
+    Phase,
+    earlier,
+    following,
+    part_way,
+    sample_moving,
+)
 from kumite.kernels.pose import add_rotated, quaternion_product
 
-TINY = 1e-12
 LN2 = 0.6931471805599453
-NEAR_ENOUGH = 1e-6  # m within which an ankle is where it should be
 MANY = 256  # characters (2 ms of work) from which threads pay, on cores that others use too
 
 
@@ -81,6 +89,9 @@ class Played(NamedTuple):
     """K characters, what they are played from and what is shown."""
 
     frame: np.ndarray  # [K] library frame shown
+    fraction: np.ndarray  # [K] of the way to the next, in [0, 1)
+    rate: np.ndarray  # [K] library frames per shown frame
+    pace: np.ndarray  # [K] the rate that led to what is shown
     stop: np.ndarray  # [K] last frame of the action
     anchor: np.ndarray  # [K, 3] library world → scene
     jump: np.ndarray  # [K] bool, whether the last action began with a join
@@ -200,48 +211,56 @@ def join(k, frame_from, frame_to, anchor, capture, offsets):
 
     What was shown stays shown: the differences go into the offsets.
     """
+    now, then = Phase(frame_from, 0.0, 1.0), Phase(frame_to, 0.0, 1.0)
+    join_at(k, frame_from, frame_to, now, then, anchor, capture, offsets)
+
+
+@kernel
+def join_at(k, frame_from, frame_to, now, then, anchor, capture, offsets):
+    """:func:`join` of a character that is at phase ``now`` and is to be at phase ``then``.
+
+    The facing frames of the two frames are laid on each other, so that a path over the ground does
+    not depend on how fast it is gone.
+    """
     here = anchor[k]
     before = here.copy()
     align(before, capture.facing[frame_from], capture.facing[frame_to], here)
+    joints = capture.wxyz.shape[1]
+    # Of the source and of the target each: a shown frame before, and now.
+    places, turns = np.empty((4, 3, 3)), np.empty((4, joints, 4))
+    ratio_from = sample_moving(capture, now, places[:2], turns[:2])
+    ratio_to = sample_moving(capture, then, places[2:], turns[2:])
     held, shown, turn, base = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
     p_from, p_to = np.empty(3), np.empty(3)
     v, w = np.zeros(3), np.zeros(3)
-    past_from = frame_from - 1
-    if past_from < 0 or capture.clip_of_frame[past_from] != capture.clip_of_frame[frame_from]:
-        past_from = frame_from
-    past_to = frame_to - 1
-    if past_to < 0 or capture.clip_of_frame[past_to] != capture.clip_of_frame[frame_to]:
-        past_to = frame_to
-    for j in range(capture.wxyz.shape[1]):
+    for j in range(joints):
         exponential(offsets.joint[k, j], held)
         if j == 0:
-            anchored_root(
-                before, capture.root[frame_from], capture.wxyz[frame_from, 0], p_from, turn
-            )
-            anchored_root(here, capture.root[frame_to], capture.wxyz[frame_to, 0], p_to, base)
+            anchored_root(before, places[1, 0], turns[1, 0], p_from, turn)
+            anchored_root(here, places[3, 0], turns[3, 0], p_to, base)
         else:
-            turn[:] = capture.wxyz[frame_from, j]
-            base[:] = capture.wxyz[frame_to, j]
+            turn[:] = turns[1, j]
+            base[:] = turns[3, j]
         quaternion_product(turn, held, shown)
         difference(base, shown, offsets.joint[k, j])
-        difference(capture.wxyz[past_from, j], capture.wxyz[frame_from, j], v)
-        difference(capture.wxyz[past_to, j], capture.wxyz[frame_to, j], w)
+        difference(turns[0, j], turns[1, j], v)
+        difference(turns[2, j], turns[3, j], w)
         for c in range(3):
-            offsets.joint_velocity[k, j, c] += (v[c] - w[c]) * capture.fps
+            change = ratio_from * v[c] - ratio_to * w[c]
+            offsets.joint_velocity[k, j, c] += change * capture.fps
+    fps_from, fps_to = capture.fps * ratio_from, capture.fps * ratio_to
     for c in range(3):
         offsets.root[k, c] += p_from[c] - p_to[c]
-    add_movement(capture.root, past_from, frame_from, before, capture.fps, offsets.root_velocity[k])
-    add_movement(capture.root, past_to, frame_to, here, -capture.fps, offsets.root_velocity[k])
+    add_movement(places[:, 0], 0, 1, before, fps_from, offsets.root_velocity[k])
+    add_movement(places[:, 0], 2, 3, here, -fps_to, offsets.root_velocity[k])
     for f in range(2):
-        ankle = capture.ankle[:, f]
-        add_movement(ankle, past_from, frame_from, before, capture.fps, offsets.foot_velocity[k, f])
-        add_movement(ankle, past_to, frame_to, here, -capture.fps, offsets.foot_velocity[k, f])
-        x0, z0 = planar_point(
-            before, capture.ankle[frame_from, f, 0], capture.ankle[frame_from, f, 2]
-        )
-        x1, z1 = planar_point(here, capture.ankle[frame_to, f, 0], capture.ankle[frame_to, f, 2])
+        ankle = places[:, 1 + f]
+        add_movement(ankle, 0, 1, before, fps_from, offsets.foot_velocity[k, f])
+        add_movement(ankle, 2, 3, here, -fps_to, offsets.foot_velocity[k, f])
+        x0, z0 = planar_point(before, ankle[1, 0], ankle[1, 2])
+        x1, z1 = planar_point(here, ankle[3, 0], ankle[3, 2])
         offsets.foot[k, f, 0] += x0 - x1
-        offsets.foot[k, f, 1] += capture.ankle[frame_from, f, 1] - capture.ankle[frame_to, f, 1]
+        offsets.foot[k, f, 1] += ankle[1, 1] - ankle[3, 1]
         offsets.foot[k, f, 2] += z0 - z1
 
 
@@ -266,172 +285,47 @@ def turned_rate(turn, velocity, out):
 
 
 @kernel
-def adopt(k, frame, anchor, shown, moving, ankles, stepping, capture, offsets):
+def adopt(k, frame, rate, anchor, shown, moving, ankles, stepping, capture, offsets):
     """Let character k go on from a pose of its own as if it had come to a frame, in place.
 
     shown [J + 1, 4]: the root's place (and one number more), then local rotations; moving
     [J + 1, 3]: their velocities, m/s and rad/s in joint axes; ankles, stepping [2, 3]: where the
-    pose has them and how they move. The anchor [K, 3] is the one under which the frame is played.
-    All that differs from the capture goes into the offsets: place and velocity stay.
+    pose has them and how they move. The anchor [K, 3] is the one under which the frame is played,
+    and the capture moves at ``rate`` there. All that differs from the capture goes into the
+    offsets: place and velocity stay.
     """
-    here = anchor[k]
-    past = frame - 1
-    if past < 0 or capture.clip_of_frame[past] != capture.clip_of_frame[frame]:
-        past = frame
+    here, joints = anchor[k], capture.wxyz.shape[1]
+    places, turns = np.empty((2, 3, 3)), np.empty((2, joints, 4))
+    fps = capture.fps * sample_moving(capture, Phase(frame, 0.0, rate), places, turns)
     place, base, v, back = np.empty(3), np.empty(4), np.empty(3), np.empty(4)
     carried, none = np.empty(3), np.zeros(3)
-    anchored_root(here, capture.root[frame], capture.wxyz[frame, 0], place, base)
-    for j in range(capture.wxyz.shape[1]):
+    anchored_root(here, places[1, 0], turns[1, 0], place, base)
+    for j in range(joints):
         if j > 0:
-            base[:] = capture.wxyz[frame, j]
+            base[:] = turns[1, j]
         turn = offsets.joint[k, j]
         difference(base, shown[1 + j], turn)
-        difference(capture.wxyz[past, j], capture.wxyz[frame, j], v)
+        difference(turns[0, j], turns[1, j], v)
         exponential(-turn, back)
         add_rotated(back, v, none, carried)  # the capture's own, in the axes of the pose shown
         for c in range(3):
-            carried[c] = moving[1 + j, c] - carried[c] * capture.fps
+            carried[c] = moving[1 + j, c] - carried[c] * fps
         turned_rate(turn, carried, offsets.joint_velocity[k, j])
     for c in range(3):
         offsets.root[k, c] = shown[0, c] - place[c]
         offsets.root_velocity[k, c] = moving[0, c]
-    add_movement(capture.root, past, frame, here, -capture.fps, offsets.root_velocity[k])
+    add_movement(places[:, 0], 0, 1, here, -fps, offsets.root_velocity[k])
     for f in range(2):
-        ankle = capture.ankle[:, f]
-        x, z = planar_point(here, ankle[frame, 0], ankle[frame, 2])
+        ankle = places[:, 1 + f]
+        x, z = planar_point(here, ankle[1, 0], ankle[1, 2])
         offsets.foot[k, f, 0] = ankles[f, 0] - x
-        offsets.foot[k, f, 1] = ankles[f, 1] - ankle[frame, 1]
+        offsets.foot[k, f, 1] = ankles[f, 1] - ankle[1, 1]
         offsets.foot[k, f, 2] = ankles[f, 2] - z
         for c in range(3):
             offsets.foot_velocity[k, f, c] = stepping[f, c]
-        add_movement(ankle, past, frame, here, -capture.fps, offsets.foot_velocity[k, f])
+        add_movement(ankle, 0, 1, here, -fps, offsets.foot_velocity[k, f])
     offsets.reaction[k] = 0.0
     offsets.reaction_velocity[k] = 0.0
-
-
-@kernel
-def product(aw, ax, ay, az, bw, bx, by, bz):
-    """Hamilton product of two quaternions, in scalars: no array is made for it."""
-    return (
-        aw * bw - ax * bx - ay * by - az * bz,
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-    )
-
-
-@kernel
-def pose_joint(j, parents, offsets, wxyz, position, world):
-    """Position and world rotation of a joint below the root, whose parent's are up to date."""
-    p = parents[j]
-    pw, px, py, pz = world[p, 0], world[p, 1], world[p, 2], world[p, 3]
-    x, y, z = offsets[j, 0], offsets[j, 1], offsets[j, 2]
-    # v + 2 w (u x v) + 2 u x (u x v)
-    tx, ty, tz = 2.0 * (py * z - pz * y), 2.0 * (pz * x - px * z), 2.0 * (px * y - py * x)
-    position[j, 0] = position[p, 0] + x + pw * tx + py * tz - pz * ty
-    position[j, 1] = position[p, 1] + y + pw * ty + pz * tx - px * tz
-    position[j, 2] = position[p, 2] + z + pw * tz + px * ty - py * tx
-    world[j, 0], world[j, 1], world[j, 2], world[j, 3] = product(
-        pw, px, py, pz, wxyz[j, 0], wxyz[j, 1], wxyz[j, 2], wxyz[j, 3]
-    )
-
-
-@kernel
-def pose_below(below, parents, offsets, wxyz, position, world_wxyz):
-    """Positions and world rotations of the joints of a limb, whose parents' are up to date."""
-    for i in range(below.shape[0]):
-        if below[i] < 0:
-            break
-        pose_joint(below[i], parents, offsets, wxyz, position, world_wxyz)
-
-
-@kernel
-def turned(w, x, y, z, a, b, c):
-    """A vector (a, b, c) turned by a quaternion, in scalars."""
-    tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
-    return a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx
-
-
-@kernel
-def set_local(j, parents, world, w, x, y, z, wxyz):
-    """The local rotation of joint j that gives it a world rotation, under its parent's."""
-    if j == 0:
-        wxyz[0, 0], wxyz[0, 1], wxyz[0, 2], wxyz[0, 3] = w, x, y, z
-        return
-    p = parents[j]
-    wxyz[j, 0], wxyz[j, 1], wxyz[j, 2], wxyz[j, 3] = product(
-        world[p, 0], -world[p, 1], -world[p, 2], -world[p, 3], w, x, y, z
-    )
-
-
-@kernel
-def bend_of(a, b, now, want):
-    """By how much [rad] the joint between bones a and b opens for its ends to be ``want`` apart."""
-    cos_now = min(max((a * a + b * b - now * now) / (2 * a * b + TINY), -1.0), 1.0)
-    cos_want = min(max((a * a + b * b - want * want) / (2 * a * b + TINY), -1.0), 1.0)
-    return np.arccos(cos_want) - np.arccos(cos_now)
-
-
-@kernel
-def reach(upper, middle, end, below, goal, parents, offsets, wxyz, position, world):
-    """Two-bone inverse kinematics: bring joint ``end`` to ``goal`` [3], keep its world rotation.
-
-    below: the joints that hang from ``upper``, itself first, then -1.
-
-    The limb bends in the plane it bends in; out of reach it stretches towards the goal to 99.9 %.
-    Leaves local rotations, positions and world rotations up to date.
-    """
-    ux, uy, uz = position[upper, 0], position[upper, 1], position[upper, 2]
-    mx, my, mz = position[middle, 0], position[middle, 1], position[middle, 2]
-    ex, ey, ez = position[end, 0], position[end, 1], position[end, 2]
-    gx, gy, gz = goal[0] - ux, goal[1] - uy, goal[2] - uz
-    off = (goal[0] - ex) ** 2 + (goal[1] - ey) ** 2 + (goal[2] - ez) ** 2
-    if off < NEAR_ENOUGH * NEAR_ENOUGH:
-        return
-    px, py, pz = ux - mx, uy - my, uz - mz  # from the middle to both ends
-    qx, qy, qz = ex - mx, ey - my, ez - mz
-    a, b = np.sqrt(px * px + py * py + pz * pz), np.sqrt(qx * qx + qy * qy + qz * qz)
-    now = np.sqrt((ex - ux) ** 2 + (ey - uy) ** 2 + (ez - uz) ** 2)
-    longest = max(0.999 * (a + b), now)  # a straighter capture than that is not bent by force
-    want = min(max(np.sqrt(gx * gx + gy * gy + gz * gz), abs(a - b) + 1e-4), longest)
-    ax, ay, az = py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx
-    length = np.sqrt(ax * ax + ay * ay + az * az)
-    if length < 1e-6 * a * b:
-        # A straight limb: bend about the joint's own side axis, the knee forward (+Z).
-        ax, ay, az = turned(
-            world[middle, 0], world[middle, 1], world[middle, 2], world[middle, 3], -1.0, 0.0, 0.0
-        )
-        length = 1.0
-    bend = 0.5 * bend_of(a, b, now, want)
-    s = np.sin(bend) / length
-    bw, bx, by, bz = np.cos(bend), s * ax, s * ay, s * az
-    # Where the end comes to by the bend alone, and the shortest turn from there to the goal.
-    qx, qy, qz = turned(bw, bx, by, bz, qx, qy, qz)
-    vx, vy, vz = mx + qx - ux, my + qy - uy, mz + qz - uz
-    scale = 1.0 / (np.sqrt((vx * vx + vy * vy + vz * vz) * (gx * gx + gy * gy + gz * gz)) + TINY)
-    tw = 1.0 + scale * (vx * gx + vy * gy + vz * gz)
-    tx, ty, tz = (
-        scale * (vy * gz - vz * gy),
-        scale * (vz * gx - vx * gz),
-        scale * (vx * gy - vy * gx),
-    )
-    n = 1.0 / (np.sqrt(tw * tw + tx * tx + ty * ty + tz * tz) + TINY)
-    tw, tx, ty, tz = n * tw, n * tx, n * ty, n * tz
-    w, x, y, z = product(
-        bw, bx, by, bz, world[middle, 0], world[middle, 1], world[middle, 2], world[middle, 3]
-    )
-    set_local(middle, parents, world, w, x, y, z, wxyz)
-    w, x, y, z = product(
-        tw, tx, ty, tz, world[upper, 0], world[upper, 1], world[upper, 2], world[upper, 3]
-    )
-    set_local(upper, parents, world, w, x, y, z, wxyz)
-    p = parents[end]  # it is carried by both turns
-    w, x, y, z = product(bw, bx, by, bz, world[p, 0], world[p, 1], world[p, 2], world[p, 3])
-    w, x, y, z = product(tw, tx, ty, tz, w, x, y, z)
-    wxyz[end, 0], wxyz[end, 1], wxyz[end, 2], wxyz[end, 3] = product(
-        w, -x, -y, -z, world[end, 0], world[end, 1], world[end, 2], world[end, 3]
-    )
-    pose_below(below, parents, offsets, wxyz, position, world)
 
 
 @kernel
@@ -470,8 +364,11 @@ def give_way(axes, owner, levers, displacement, shares, damping, turn):
 
 
 @kernel
-def move_feet(foot_offset, foot_velocity, planted, half_life, longest, dt):
+def move_feet(foot_offset, foot_velocity, planted, and_planted, half_life, longest, dt):
     """Offsets of the two feet over one frame: held on the ground, faded in the air, in place.
+
+    planted, and_planted [2]: whether a foot stands in the frames before and after the phase shown.
+    On the way from a frame in which it stands to one in which it does not, it moves.
 
     An offset longer than ``longest`` [m] fades on the ground too: better a slip than a split.
     """
@@ -479,7 +376,7 @@ def move_feet(foot_offset, foot_velocity, planted, half_life, longest, dt):
         # Height always fades: a foot must not stand in the air.
         spring(foot_offset[f, 1:2], foot_velocity[f, 1:2], half_life, dt)
         far = foot_offset[f, 0] ** 2 + foot_offset[f, 2] ** 2 > longest * longest
-        if planted[f] and not far:
+        if planted[f] and and_planted[f] and not far:
             foot_velocity[f, 0] = 0.0
             foot_velocity[f, 2] = 0.0
         else:
@@ -504,11 +401,12 @@ def turned_by(x, y, z):
 @kernel
 def show_one(k, dt, played):
     """One frame of character k of :func:`show`."""
-    f, anchor = played.frame[k], played.anchor
+    f, part, anchor = played.frame[k], played.fraction[k], played.anchor
     if played.held[k]:
         dt = 0.0
     springs, capture, build = played.springs, played.capture, played.build
     offsets, poses = played.offsets, played.poses
+    g = following(capture.clip_of_frame, f) if part > 0.0 else f
     root_position, wxyz = poses.root_position[k], poses.wxyz[k]
     position, world = poses.position[k], poses.world_wxyz[k]
     spring(offsets.root[k], offsets.root_velocity[k], springs.root, dt)
@@ -516,6 +414,7 @@ def show_one(k, dt, played):
         offsets.foot[k],
         offsets.foot_velocity[k],
         capture.on_ground[f],
+        capture.on_ground[g],
         springs.joint,
         springs.longest_foot_offset,
         dt,
@@ -525,7 +424,14 @@ def show_one(k, dt, played):
     quick, slow = 2.0 * LN2 / springs.joint, 2.0 * LN2 / springs.reaction
     left_quick, left_slow = np.exp(-quick * dt), np.exp(-slow * dt)
     root_wxyz = np.empty(4)
-    anchored_root(anchor[k], capture.root[f], capture.wxyz[f, 0], root_position, root_wxyz)
+    if part > 0.0:
+        root, turn = np.empty(3), np.empty(4)
+        for c in range(3):
+            root[c] = capture.root[f, c] + part * (capture.root[g, c] - capture.root[f, c])
+        turn[0], turn[1], turn[2], turn[3] = part_way(capture.wxyz, f, g, 0, part)
+        anchored_root(anchor[k], root, turn, root_position, root_wxyz)
+    else:
+        anchored_root(anchor[k], capture.root[f], capture.wxyz[f, 0], root_position, root_wxyz)
     for c in range(3):
         root_position[c] += offsets.root[k, c]
     parents, bones = build.parents, build.offsets
@@ -552,14 +458,23 @@ def show_one(k, dt, played):
                 position[0, c] = root_position[c]
             continue
         q = capture.wxyz
-        w, x, y, z = product(q[f, j, 0], q[f, j, 1], q[f, j, 2], q[f, j, 3], w, x, y, z)
+        a, b, c_, d = q[f, j, 0], q[f, j, 1], q[f, j, 2], q[f, j, 3]
+        if part > 0.0:
+            a, b, c_, d = part_way(q, f, g, j, part)
+        w, x, y, z = product(a, b, c_, d, w, x, y, z)
         wxyz[j, 0], wxyz[j, 1], wxyz[j, 2], wxyz[j, 3] = w, x, y, z
         pose_joint(j, parents, bones, wxyz, position, world)
     goal = np.empty(3)
     for s in range(2):
-        x, z = planar_point(anchor[k], capture.ankle[f, s, 0], capture.ankle[f, s, 2])
+        ankle = capture.ankle
+        a, b, c_ = ankle[f, s, 0], ankle[f, s, 1], ankle[f, s, 2]
+        if part > 0.0:
+            a += part * (ankle[g, s, 0] - a)
+            b += part * (ankle[g, s, 1] - b)
+            c_ += part * (ankle[g, s, 2] - c_)
+        x, z = planar_point(anchor[k], a, c_)
         goal[0] = x + offsets.foot[k, s, 0]
-        goal[1] = capture.ankle[f, s, 1] + offsets.foot[k, s, 1]
+        goal[1] = b + offsets.foot[k, s, 1]
         goal[2] = z + offsets.foot[k, s, 2]
         thigh, shin, foot = build.legs[s, 0], build.legs[s, 1], build.legs[s, 2]
         reach(thigh, shin, foot, build.below[s], goal, parents, bones, wxyz, position, world)
@@ -577,12 +492,25 @@ show_many = parallel_kernel(_show)  # on all cores: worth its start-up from ``MA
 
 @kernel
 def begin(who, stretch, played):
-    """Characters who [W] take the stretches [K] they chose; jump [K]: whether it was a join."""
+    """Characters who [W] take the stretches [K] they chose; jump [K]: whether it was a join.
+
+    Who would pass the end of its action with the next frame has the rest of the way to it before
+    what it takes, so that the time a chain of actions takes is exact; at a join, as far as the
+    clip reaches back. Who breaks an action off begins the next at once.
+    """
     for w in range(who.shape[0]):
         k = who[w]
-        source, target = played.frame[k], played.first[stretch[k]] - 1
+        frame, fraction, rate = played.frame[k], played.fraction[k], played.rate[k]
+        left = (played.stop[k] - frame) - fraction
+        target = played.first[stretch[k]] - 1
+        ends = left >= 0.0 and left < rate - AT_FRAME
+        source = played.stop[k] if ends else frame
         played.stop[k] = played.last[stretch[k]]
-        played.frame[k] = target
-        played.jump[k] = target != source
-        if target != source:
-            join(k, source, target, played.anchor, played.capture, played.offsets)
+        played.jump[k] = target != source or (fraction > 0.0 and not ends)
+        if not played.jump[k]:
+            continue
+        clip_of_frame = played.capture.clip_of_frame
+        to, part = earlier(clip_of_frame, target, 0.0, left if ends else 0.0)
+        now, then = Phase(frame, fraction, played.pace[k]), Phase(to, part, rate)
+        join_at(k, source, target, now, then, played.anchor, played.capture, played.offsets)
+        played.frame[k], played.fraction[k] = to, part

@@ -20,10 +20,12 @@ from kumite.kernels.blow import (
     squareness,
     swept_contact,
 )
-from kumite.kernels.character import begin, planar_point, show_one, turned
+from kumite.kernels.character import begin, planar_point, show_one
 from kumite.kernels.jit import kernel, parallel_kernel, plugged
+from kumite.kernels.limb import turned
 from kumite.kernels.look_ahead import look_ahead, look_further
 from kumite.kernels.near import fill_hash, nearest
+from kumite.kernels.phase import AT_FRAME, move_on
 from kumite.kernels.policy import carry, wrapped
 
 NEIGHBOURS = 6  # bodies that a character minds, its opponent among them
@@ -37,6 +39,8 @@ class Actors(NamedTuple):
     """Where all characters are in the library and in the scene, and whom they aim at."""
 
     frame: np.ndarray  # [K]
+    fraction: np.ndarray  # [K] of the way to the next frame
+    rate: np.ndarray  # [K] library frames per shown frame
     stop: np.ndarray  # [K]
     anchor: np.ndarray  # [K, 3]
     opponent: np.ndarray  # [K] a character, or NOBODY
@@ -78,6 +82,13 @@ def draw(seed, k, n):
 
 
 @kernel
+def frame_after(k, frames, actors):
+    """The library frame that k is at after so many shown frames, along its action."""
+    along = actors.fraction[k] + frames * actors.rate[k]
+    return min(actors.frame[k] + int(along + AT_FRAME), actors.stop[k])
+
+
+@kernel
 def foresee(k, here, actors, target, other):
     """Where k's target [H, 4] and its body [H, 2] are expected, seen from ``here``."""
     o = actors.opponent[k]
@@ -88,7 +99,7 @@ def foresee(k, here, actors, target, other):
             target[h, 1], target[h, 3] = thing[1], wrapped(thing[3] - here[2])
             other[h, 0] = other[h, 1] = FAR  # a thing may be stood under
             continue
-        f = min(actors.frame[o] + h + 1, actors.stop[o])
+        f = frame_after(o, h + 1, actors)
         x, z = planar_point(actors.anchor[o], actors.aim[f, 0], actors.aim[f, 2])
         target[h, 0], target[h, 2] = carry(here, x, z)
         target[h, 1] = actors.aim[f, 1]
@@ -104,7 +115,7 @@ def decide_one(k, state, place, grid, actors, minds, moves, behaviours, horizon,
     The same as the paper's choice by value, with weights; random among the best few (A9).
     """
     here = np.empty(3)
-    f = actors.frame[k]
+    f = max(actors.frame[k], actors.stop[k])  # where its action ends, if it is not quite there
     here[0], here[1] = planar_point(actors.anchor[k], actors.facing[f, 0], actors.facing[f, 1])
     here[2] = actors.anchor[k, 2] + actors.facing[f, 2]
     target = np.empty((horizon, 4))
@@ -118,7 +129,7 @@ def decide_one(k, state, place, grid, actors, minds, moves, behaviours, horizon,
             if j == actors.opponent[k] or count == NEIGHBOURS:
                 continue
             for h in range(horizon):
-                g = min(actors.frame[j] + h + 1, actors.stop[j])
+                g = frame_after(j, h + 1, actors)
                 x, z = planar_point(actors.anchor[j], actors.root[g, 0], actors.root[g, 2])
                 others[count, h, 0], others[count, h, 1] = carry(here, x, z)
             count += 1
@@ -381,7 +392,7 @@ def _advance(dt, played, grid, opponent, room, shapes, blows):
     """
     place = played.poses.root_position
     for k in prange(played.frame.shape[0]):
-        played.frame[k] += 1
+        move_on(k, played.frame, played.fraction, played.rate, played.pace)
         show_one(k, dt, played)
     fill_hash(place, grid)
     for k in prange(played.frame.shape[0]):

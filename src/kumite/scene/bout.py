@@ -219,10 +219,11 @@ class BoutScene:
         if self._nearest[k]:
             self._turn_to_nearest(k)
         cast, table, o = self.cast, self.library.table, int(self.floor.opponent[k])
-        facing = cast.facing
+        reached = cast.reached
+        facing = cast.facing_at(reached)
         pair = (k, o)
         late = self.reactions.late
-        local = [int(cast.frame[p] - table.first[self.stretch[p]] + 1 - late[p]) for p in pair]
+        local = [int(reached[p] - table.first[self.stretch[p]] + 1 - late[p]) for p in pair]
         begun = (float(self.frame - local[0]), float(self.frame - local[1]))
         state = self.tree.state(
             (int(self.stretch[k]), int(self.stretch[o])),
@@ -275,10 +276,8 @@ class BoutScene:
             return NOBODY_ELSE
         step = np.arange(GOALS) * round(GOAL_EVERY * self.fps)
         cast, facing = self.cast, self.library.clips.facing
-        frame = np.minimum(
-            cast.frame[who, None] + step, np.maximum(cast.stop, cast.frame)[who, None]
-        )
-        track = planar_compose(cast.anchor[who, None], facing[frame])[..., :2]
+        ahead = facing[cast.frames_ahead(who, step)]
+        track = planar_compose(cast.anchor[who, None], ahead)[..., :2]
         after = self.floor.opponent[who]
         side = np.where(after == o, 0, np.where(after == k, 1, -1))
         styles = [self.players[e].style for e in who.tolist()]

@@ -188,6 +188,8 @@ class LiveScene:
         self._things[:, 3] = yaws
         self._actors = kernels.Actors(
             cast.frame,
+            cast.fraction,
+            cast.rate,
             cast.stop,
             cast.anchor,
             self.floor.opponent,
@@ -245,7 +247,7 @@ class LiveScene:
             self._things[o, :3] = thing.position
         cast, floor = self.cast, self.floor
         who = cast.waiting
-        states = np.searchsorted(self.library.table.state_frame, cast.frame[who])
+        states = np.searchsorted(self.library.table.state_frame, cast.reached[who])
         self.fighters.note(who)
         run = kernels.step_many if cast.count >= MANY else kernels.step
         happened = run(

@@ -69,6 +69,15 @@ def _closest(ground: np.ndarray) -> list[float]:
     return [float(np.min(KDTree(frame).query(frame, k=2)[0][:, 1])) for frame in ground]
 
 
+def _goes_on(recording: Recording, k: int) -> np.ndarray:
+    """Whether a character [F - 1] shows what comes next in the capture, at its rate."""
+    passed = np.diff(recording.library_frame[:, k])
+    if recording.rate is None:
+        return passed == 1
+    rate = recording.rate[1:, k]
+    return (passed == np.floor(rate)) | (passed == np.ceil(rate))
+
+
 def measure(recording: Recording) -> Metrics:
     """Score a recording."""
     skeleton, fps = recording.skeleton, recording.fps
@@ -104,7 +113,7 @@ def measure(recording: Recording) -> Metrics:
             share = float(np.mean(np.abs(off) <= FACING_WITHIN))
         shown = recording.library_frame[:, k]
         physical = (shown[1:] == NO_FRAME) & (shown[:-1] == NO_FRAME)
-        jump = np.flatnonzero((np.diff(shown) != 1) & ~physical) + 1
+        jump = np.flatnonzero(~_goes_on(recording, k) & ~physical) + 1
         speed = np.linalg.norm(np.diff(positions[k][:, 0], axis=0), axis=1) * fps
         inner = jump[(jump >= 2) & (jump < len(recording))]
         change = np.abs(speed[inner - 1] - speed[inner - 2])

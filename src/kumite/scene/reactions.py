@@ -7,6 +7,7 @@ So from the hit on it is known what the victim does and when it chooses again; t
 cannot run physics at every node, expects the response of :attr:`GameTree.response` in its place.
 
 Without physics the struck segment gives way and the response that the tree expects begins at once.
+Whoever reacts does so at the captured speed.
 """
 
 from __future__ import annotations
@@ -118,6 +119,7 @@ class Reactions:
         """A fighter does something else from now on."""
         if self._moments.pop(k, None) is not None:
             self.floor.cast.held[k], self.late[k] = False, 0
+        self.floor.cast.set_rate(k, 1.0)
 
     def react(self, landing: Landing, blocked: bool, falls: bool = False) -> Reaction | None:
         """A blow has landed; a blocked one only moves the arm that it meets.
@@ -140,6 +142,7 @@ class Reactions:
         if response == NOTHING:
             return None
         impulse = blow_impulse(landing.velocity, limb)
+        cast.set_rate(landing.victim, 1.0)
         return Reaction(response, False, self._told(response, SIZES[size], impulse, None))
 
     def _told(self, stretch: int, size: str, impulse: np.ndarray, pushed: Pushed | None) -> dict:
@@ -178,6 +181,7 @@ class Reactions:
         )
         frame, last = int(self._responses.frame[entry]), int(self._responses.last[entry])
         stretch = int(self._stretch[self._responses.response[entry]])
+        cast.set_rate(k, 1.0)
         cast.adopt(k, frame, last, pushed.end)  # whence it will be played: others may count on it
         position, _ = forward_kinematics(
             self.floor.cast.library.clips.skeleton, pushed.root_position, pushed.wxyz

@@ -47,6 +47,7 @@ class Recording:
     object_position: np.ndarray = field(default_factory=lambda: np.zeros((0, 0, 3), np.float32))
     events: tuple[Event, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)  # seed, library, scene settings
+    rate: np.ndarray | None = None  # [F, K] float32 captured frames passed to come here; None: 1
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -74,6 +75,11 @@ class Recording:
                 raise KumiteError(
                     f"recording: {name} is {getattr(self, name).shape}, expected {shape}"
                 )
+        if self.rate is not None:
+            rate = np.ascontiguousarray(self.rate, dtype=np.float32)
+            put(self, "rate", rate)
+            if rate.shape != (frames, count):
+                raise KumiteError(f"recording: rate is {rate.shape}, expected {(frames, count)}")
         if frames == 0:
             raise KumiteError("recording: no frames")
 
@@ -100,6 +106,7 @@ class Recording:
             wxyz=self.wxyz[:, one],
             contacts=self.contacts[:, one],
             library_frame=self.library_frame[:, one],
+            rate=None if self.rate is None else self.rate[:, one],
             events=tuple(e for e in self.events if e.character == name),
         )
 
@@ -155,6 +162,8 @@ def save_recording(path: Path | str, recording: Recording) -> None:
         "library_frame": recording.library_frame,
         "object_position": recording.object_position,
     }
+    if recording.rate is not None:
+        arrays["rate"] = recording.rate
     files.save(path, KIND, VERSION, header, arrays)
 
 

@@ -40,6 +40,7 @@ def record(
     wxyz = np.empty((frames, count, joints, 4), np.float32)
     contacts = np.empty((frames, count, 2), bool)
     shown = np.empty((frames, count), np.int32)
+    rate = np.empty((frames, count), np.float32)
     things = np.empty((frames, len(scene.objects), 3), np.float32)
     begin, seen = scene.frame, len(scene.events)
     for f in range(frames):
@@ -49,6 +50,7 @@ def record(
         wxyz[f] = scene.wxyz
         contacts[f] = scene.cast.contacts
         shown[f] = np.where(scene.cast.held, NO_FRAME, scene.cast.frame)
+        rate[f] = scene.cast.pace
         for o, thing in enumerate(scene.objects):
             things[f, o] = thing.position
         if f % 256 == 0:
@@ -65,6 +67,7 @@ def record(
         library_frame=shown,
         objects=tuple(thing.name for thing in scene.objects),
         object_position=things,
+        rate=None if np.all(rate == 1.0) else rate,
         events=tuple(_counted_from(begin, e, scene.fps) for e in scene.events[seen:]),
         settings={
             "seed": scene.seed,

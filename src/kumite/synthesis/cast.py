@@ -13,7 +13,8 @@ from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.kernels import character as kernels
 from kumite.kernels.blow import NO_BLOW
-from kumite.rotation import planar_compose, planar_inverse
+from kumite.kernels.phase import AT_FRAME, move_all
+from kumite.rotation import planar_compose, planar_inverse, wrap_angle
 from kumite.synthesis.moment import Moment
 from kumite.synthesis.recoil import RATE, REACTION_HALF_LIFE, give_way
 
@@ -23,6 +24,7 @@ JOIN_HALF_LIFE = 0.10  # s, for the difference of the joints at a join
 ROOT_HALF_LIFE = 0.20  # s, the same for the root: its speed must not be felt to jump
 LONGEST_FOOT_OFFSET = 0.30  # m that a planted foot may stand away from where the capture has it
 SPRINGS = kernels.Springs(JOIN_HALF_LIFE, ROOT_HALF_LIFE, REACTION_HALF_LIFE, LONGEST_FOOT_OFFSET)
+SLOWEST, FASTEST = 0.25, 4.0  # library frames per shown frame
 BLOW_BEFORE, BLOW_AFTER = 0.07, 0.12  # s around the effective frames in which a blow may land
 
 
@@ -50,6 +52,9 @@ class Cast:
             skeleton.parents, skeleton.offsets, np.array(legs), _below(skeleton, legs)
         )
         self.frame = np.zeros(count, dtype=np.int64)  # library frame shown
+        self.fraction = np.zeros(count)  # of the way to the next, in [0, 1)
+        self.rate = np.ones(count)  # library frames per shown frame, see set_rate
+        self.pace = np.ones(count)  # the rate that led to what is shown
         self.stop = np.zeros(count, dtype=np.int64)  # last frame of the action: choose again there
         self.anchor = np.zeros((count, 3))  # library world → scene
         self.root_position = np.zeros((count, 3))
@@ -66,6 +71,9 @@ class Cast:
         self.stands = np.zeros((count, 2), dtype=bool)  # on which feet it does so
         self.played = kernels.Played(
             self.frame,
+            self.fraction,
+            self.rate,
+            self.pace,
             self.stop,
             self.anchor,
             self.jump,
@@ -82,24 +90,87 @@ class Cast:
 
     @property
     def contacts(self) -> np.ndarray:
-        """Which feet are planted now [K, 2] bool."""
+        """Which feet are planted now [K, 2] bool.
+
+        Between two frames a foot is if it is in both: on the way to one in which it is not, it
+        moves.
+        """
         on_ground = self.library.contacts.on_ground[self.frame]
+        if np.any(self.fraction):
+            on_ground &= self.library.contacts.on_ground[self._following]
         return np.where(self.held[:, None], self.stands, on_ground)
 
     @property
     def facing(self) -> np.ndarray:
         """Facing frames [K, 3] in the scene."""
-        return planar_compose(self.anchor, self.library.clips.facing[self.frame])
+        facing = self.library.clips.facing[self.frame]
+        if np.any(self.fraction):
+            way = self.library.clips.facing[self._following] - facing
+            way[:, 2] = wrap_angle(way[:, 2])
+            facing = facing + self.fraction[:, None] * way
+        return planar_compose(self.anchor, facing)
+
+    @property
+    def _following(self) -> np.ndarray:
+        """The frames [K] towards which fractions count."""
+        clips = self.library.clips
+        after = np.minimum(self.frame + 1, len(clips) - 1)
+        same = clips.clip_of_frame[after] == clips.clip_of_frame[self.frame]
+        return np.where(same & (self.fraction > 0.0), after, self.frame)
+
+    @property
+    def phase(self) -> np.ndarray:
+        """What is shown [K], in library frames: frame and fraction."""
+        return self.frame + self.fraction
+
+    @property
+    def _waits(self) -> np.ndarray:
+        return (self.stop - self.frame) - self.fraction < self.rate - AT_FRAME
 
     @property
     def waiting(self) -> np.ndarray:
-        """Characters whose action has ended: each must :meth:`begin` another before a step."""
-        return np.flatnonzero(self.frame >= self.stop)
+        """Characters who would pass the end of their action with the next frame.
+
+        Each must :meth:`begin` another before a step.
+        """
+        return np.flatnonzero(self._waits)
+
+    @property
+    def reached(self) -> np.ndarray:
+        """The frames [K] at which all are, for what is decided on: who waits, at its action's end.
+
+        There it may be a part of a frame short of it; what it takes next begins that much later.
+        """
+        return np.where(self._waits, np.maximum(self.frame, self.stop), self.frame)
+
+    def frames_ahead(self, who: np.ndarray, steps: np.ndarray) -> np.ndarray:
+        """Library frames [W, T] at which characters who [W] will be after steps [T], no farther
+        than their actions go."""
+        along = self.fraction[who, None] + steps * self.rate[who, None]
+        frame = self.frame[who, None] + np.floor(along + AT_FRAME).astype(np.int64)
+        return np.minimum(frame, np.maximum(self.stop, self.frame)[who, None])
+
+    def facing_at(self, frame: np.ndarray) -> np.ndarray:
+        """Facing frames [K, 3] in the scene of library frames [K], where they are played now."""
+        return planar_compose(self.anchor, self.library.clips.facing[frame])
+
+    def set_rate(self, who: int | np.ndarray, rate: float | np.ndarray) -> None:
+        """Play characters faster or slower from the next frame on: library frames per shown frame.
+
+        Many small changes look smooth, a large one is a jerk (:mod:`kumite.synthesis.warp`).
+        Errors: not within ``SLOWEST`` to ``FASTEST``.
+        """
+        asked = np.asarray(rate, dtype=np.float64)
+        wrong = asked[~((asked >= SLOWEST - AT_FRAME) & (asked <= FASTEST + AT_FRAME))]
+        if wrong.size:
+            raise KumiteError(f"cast: rate {wrong[0]:g}, expected {SLOWEST} to {FASTEST}")
+        self.rate[who] = asked
 
     def place(self, k: int, state: int, facing: np.ndarray) -> None:
         """Put a character into a state (of the action table) at a facing frame, at rest."""
         f = int(self.library.table.state_frame[state])
         self.frame[k] = self.stop[k] = f
+        self.fraction[k], self.rate[k], self.pace[k] = 0.0, 1.0, 1.0
         self.held[k] = False
         self.anchor[k] = planar_compose(facing, planar_inverse(self.library.clips.facing[f]))
         for array in self._offsets:
@@ -110,21 +181,28 @@ class Cast:
         kernels.begin(who, stretch, self.played)
 
     def wait(self, k: int) -> None:
-        """A character whose action has ended stays as it is for another step."""
-        self.frame[k] = self.stop[k] - 1
+        """A character whose action has ended stays at its end for another step."""
+        self._come_to(k, int(self.stop[k]))
+
+    def _come_to(self, k: int, frame: int) -> None:
+        """Let the next frame move a character on to a library frame."""
+        before = frame - self.rate[k]
+        self.frame[k] = int(np.floor(before))
+        self.fraction[k] = before - self.frame[k]
 
     def foresee(self, k: int, frames: int, alone: Cast) -> tuple[np.ndarray, np.ndarray]:
         """Roots [T, 3] and rotations [T, J, 4] that a character would show next, undisturbed.
 
-        T is ``frames``, or fewer where its action ends before; at its end, what it shows now.
+        T is ``frames``, or fewer where its action ends before; at its end, what it shows now. It
+        goes on at its rate.
         alone: a cast of one from the same library, to try it on.
         """
-        alone.frame[0], alone.stop[0] = self.frame[k], self.stop[k]
-        alone.anchor[0] = self.anchor[k]
+        for name in ("frame", "fraction", "rate", "pace", "stop", "anchor"):
+            getattr(alone, name)[0] = getattr(self, name)[k]
         for mine, theirs in zip(alone._offsets, self._offsets):
             mine[0] = theirs[k]
         roots, turns = [], []
-        for _ in range(min(frames, int(self.stop[k] - self.frame[k]))):
+        while len(roots) < frames and not alone._waits[0]:
             alone.advance()
             roots.append(alone.root_position[0].copy())
             turns.append(alone.wxyz[0].copy())
@@ -148,9 +226,9 @@ class Cast:
         :meth:`adopt`.
         """
         still = np.zeros((1 + len(wxyz), 3))
-        self.frame[k] = frame
+        self.frame[k], self.fraction[k] = frame, 0.0
         self._take(k, root_position, wxyz, still, ankles, still[:2])
-        self.frame[k] -= 1  # the frame that comes moves it on
+        self._come_to(k, frame)
         self.held[k], self.stands[k] = True, stands
 
     def adopt(
@@ -161,8 +239,10 @@ class Cast:
         It stands where ``now`` does, shows that pose at its next :meth:`show` of no time, and from
         there plays the frames after ``frame`` up to ``last`` (where it waits for a choice):
         the facing frames lie on each other, pose and velocity are continuous, and what differs
-        fades as after a join. ankles [2, 3] m: where its legs reach to, if not where the pose has
-        them. Errors: frames that are no stretch of one clip; another skeleton.
+        fades as after a join. It goes on at its rate. ankles [2, 3] m: where its legs reach to,
+        if not where the pose has them.
+
+        Errors: frames that are no stretch of one clip; another skeleton.
         """
         clips = self.library.clips
         if not (0 <= frame <= last < len(clips)) or (
@@ -174,7 +254,8 @@ class Cast:
                 f"cast: a pose of {len(now.wxyz)} joints, expected {len(clips.skeleton)}"
             )
         facing = facing_frame(clips.skeleton, now.root_position[None], now.wxyz[None])[0]
-        self.frame[k], self.stop[k], self.held[k] = frame, last, False
+        self.frame[k], self.fraction[k], self.stop[k], self.held[k] = frame, 0.0, last, False
+        self.pace[k] = self.rate[k]
         self.anchor[k] = planar_compose(facing, planar_inverse(clips.facing[frame]))
         position, velocity = now.joints(clips.skeleton)
         feet = [clips.skeleton.joint(f"{side}_foot") for side in SIDES]
@@ -192,6 +273,7 @@ class Cast:
         kernels.adopt(
             k,
             int(self.frame[k]),
+            float(self.rate[k]),
             self.anchor,
             np.concatenate([[[*root_position, 0.0]], wxyz]),
             moving,
@@ -202,8 +284,8 @@ class Cast:
         )
 
     def advance(self) -> None:
-        """Everyone one frame on, along the action begun."""
-        self.frame += 1
+        """Everyone one frame on, along the action begun, each at its rate."""
+        move_all(self.frame, self.fraction, self.rate, self.pace)
         self.show(1.0 / self.library.clips.fps)
 
     def show(self, dt: float) -> None:
