@@ -11,7 +11,6 @@ from kumite.synthesis.ragdoll import (
     has_physics,
 )
 from kumite.synthesis.response import Responses, find_responses
-from kumite.synthesis.warp import Warp, edge_frames, make_profile, place_of, time_warp
 
 __all__ = [
     "EFFECTIVE_MASS",
@@ -21,12 +20,7 @@ __all__ = [
     "Ragdoll",
     "Responses",
     "Tone",
-    "Warp",
     "blow_impulse",
-    "edge_frames",
     "find_responses",
     "has_physics",
-    "make_profile",
-    "place_of",
-    "time_warp",
 ]

@@ -157,7 +157,7 @@ class Cast:
     def set_rate(self, who: int | np.ndarray, rate: float | np.ndarray) -> None:
         """Play characters faster or slower from the next frame on: library frames per shown frame.
 
-        Many small changes look smooth, a large one is a jerk (:mod:`kumite.synthesis.warp`).
+        Many small changes look smooth, a large one is a jerk (:mod:`kumite.kernels.warp`).
         Errors: not within ``SLOWEST`` to ``FASTEST``.
         """
         asked = np.asarray(rate, dtype=np.float64)
