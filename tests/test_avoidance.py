@@ -436,6 +436,11 @@ def avoider() -> ClipSet:
     return concatenate(perform("avoidance", seed=0, mirrored=False).clips)
 
 
+def spread(found: list[tuple[int, int]], clip_start: np.ndarray) -> AvoidanceParts:
+    start, stop = np.array(found, np.int64).reshape(-1, 2).T
+    return AvoidanceParts(start, stop, clip_start)
+
+
 def is_whole(library: Library) -> None:
     """Each stretch has all frames of a part or none."""
     table, parts = library.table, library.avoidance
@@ -480,7 +485,7 @@ def test_no_transition_cuts_a_part(avoider: ClipSet, event: str):
 def test_any_parts_are_kept_whole(avoider: ClipSet, spans: list[tuple[int, int]], event: str):
     short = concatenate([next(iter(avoider))])
     found = apart([(a, min(a + n, len(short))) for a, n in spans])
-    parts = AvoidanceParts(*np.array(found, np.int64).reshape(-1, 2).T, short.clip_start)
+    parts = spread(found, short.clip_start)
     try:
         library = build_library(short, event=event, per_second=4.0, avoidance=parts)
     except KumiteError as error:
@@ -575,7 +580,7 @@ def test_what_is_cut_is_moved_or_joined(cuts, start, stop, shortest: int, expect
 )
 def test_no_part_is_cut_and_no_frame_is_lost(cuts, found, shortest: int):
     found = apart([x for x in found if x[1] <= 40] + [x for x in found if x[0] >= 40])
-    parts = AvoidanceParts(*np.array(found, np.int64).reshape(-1, 2).T, np.array([0, 40, 100]))
+    parts = spread(found, np.array([0, 40, 100]))
     made = uncut(line(*cuts, clips=(0, 40, 100)), parts, shortest)
     for a, b in found:
         inside = (made.start <= a) & (made.stop >= b)
