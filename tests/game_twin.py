@@ -91,6 +91,7 @@ class Toy:
     defence_range: float = 3.0
     tip_radius: float = 0.03
     catch: float = 0.0
+    arena: float = 0.0
     stagger_from: float = 5.2
     fall_from: float = 10.0
 
@@ -143,12 +144,16 @@ class Toy:
             np.array([tip.blow for tip in tips], np.int64),
             np.array(last, np.int64),
             np.array(reach, float),
+            np.arange(len(self.choices) + 1),  # all can rest where they are
+            np.zeros(len(self.choices) + 1, np.int64),
+            np.zeros((0, 2)),
             self.stride,
             np.full(2, self.facing),
             self.attack_range,
             self.defence_range,
             self.tip_radius,
             self.catch,
+            self.arena,
             self.stagger_from,
             self.fall_from,
             np.array([self.vulnerable(b) for b in range(SPHERES)]),
