@@ -18,7 +18,7 @@ from kumite.body import lay_body
 from kumite.control.combination import build_table
 from kumite.control.styles import STYLES, VULNERABILITY, Style, short_range
 from kumite.errors import KumiteError
-from kumite.graph import ActionTable, Library
+from kumite.graph import Library
 from kumite.kernels import game as fight
 from kumite.kernels import moves as kernels
 from kumite.kernels import prune
@@ -461,28 +461,40 @@ def _moves(library: Library) -> kernels.Moves:
         _ranks(library)[windows[frame[row], limb]],
         last_tip.astype(np.int64),
         reach,
-        *halts(table, start, track, max(1, round(clips.fps * HALT_EVERY))),
+        *halts(
+            table.action_start,
+            table.stretch,
+            table.target,
+            start,
+            track,
+            max(1, round(clips.fps * HALT_EVERY)),
+        ),
     )
 
 
 def halts(
-    table: ActionTable, start: np.ndarray, track: np.ndarray, stride: int
+    first: np.ndarray,
+    ways: np.ndarray,
+    target: np.ndarray,
+    start: np.ndarray,
+    track: np.ndarray,
+    stride: int,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Ways to come to rest from each state [N + 1], where their places begin [W + 1], and those
-    [Q, 2], seen from the state; rows of tracks [R, 3] begin with ``start`` [L + 1].
+    [Q, 2], seen from the state. A state offers stretches ``ways`` [A] from its ``first`` [N + 1]
+    on, which lead into ``target`` [L] along rows of ``track`` [R, 3] from ``start`` [L + 1] on.
 
     At rest is who can go on with stretches that go nowhere: a way without places. From any other
     state the few that take least room, each a stretch and then a way from where it leads: what is
     left of a way is a way again. A state from which nobody comes to rest has none.
     """
-    first, ways = table.action_start, table.stretch
     room = np.maximum.reduceat(np.linalg.norm(track[:, :2], axis=1), start[:-1])
     stays = room[ways] <= GOES_NOWHERE
     owner = np.repeat(np.arange(len(first) - 1), np.diff(first))
     rests = np.ones(len(first) - 1, dtype=bool)
     while True:
         found = np.zeros_like(rests)
-        found[owner[stays & rests[table.target[ways]]]] = True
+        found[owner[stays & rests[target[ways]]]] = True
         found &= rests
         if np.array_equal(found, rests):
             break
@@ -492,7 +504,7 @@ def halts(
         more: dict[int, list[np.ndarray]] = {}
         for state in [n for n, known in enumerate(out) if not known]:
             for k in ways[first[state] : first[state + 1]].tolist():
-                known = out[int(table.target[k])]
+                known = out[int(target[k])]
                 if not known:
                     continue
                 rows = np.arange(start[k + 1] - 1, start[k], -stride)[::-1]
