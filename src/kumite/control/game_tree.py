@@ -520,8 +520,8 @@ def halts(
     flat = [way for of in out for way in of]
     places = np.concatenate([np.zeros((0, 3)), *flat])
     return (
-        np.concatenate([[0], np.cumsum([len(of) for of in out])]).astype(np.int64),
-        np.concatenate([[0], np.cumsum([len(way) for way in flat])]).astype(np.int64),
+        np.cumsum([0, *(len(of) for of in out)]),
+        np.cumsum([0, *(len(way) for way in flat)]),
         np.ascontiguousarray(places[:, :2]),
     )
 

@@ -108,7 +108,8 @@ def beyond(x, z, yaw, u, w, arena):
 def leaves(k, x, z, yaw, moves, rules):
     """Whether stretch k leads out of the arena from (x, z, yaw), or farther out from outside.
 
-    Every ``stride`` frames and the last are looked at; between two inside it is inside: it is round.
+    The last frame and every ``stride`` before it are looked at: straight between two places inside
+    is inside.
     """
     hull, track, arena = moves.hull, moves.track, rules.arena
     if beyond(x, z, yaw, hull[k, 0], hull[k, 1], arena) < -hull[k, 2]:  # nor does any of the body
