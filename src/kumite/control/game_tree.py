@@ -507,7 +507,7 @@ def halts(
                 known = out[int(target[k])]
                 if not known:
                     continue
-                rows = np.arange(start[k + 1] - 1, start[k], -stride)[::-1]
+                rows = np.arange(int(start[k + 1]) - 1, int(start[k]), -stride)[::-1]
                 more.setdefault(state, []).extend(
                     np.concatenate([track[rows], planar_compose(track[rows[-1]], way)])
                     for way in known
