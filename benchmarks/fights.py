@@ -40,6 +40,7 @@ class Job:
     depths: tuple[int, ...] = ()  # of its fighters, in place of the scene's
     seconds: float = SECONDS
     pairs: int | None = None
+    endless: bool = False  # without the scene's arena
     tallied: bool = False  # whole trees of three levels are counted at every decision
 
     @property
@@ -47,6 +48,9 @@ class Job:
         settings = load_scene(self.scene)
         if settings.bout is not None and settings.bout.scatter == 0:
             bout = settings.bout.model_copy(update=SCATTER)
+            settings = settings.model_copy(update={"bout": bout})
+        if settings.bout is not None and self.endless:
+            bout = settings.bout.model_copy(update={"arena": None})
             settings = settings.model_copy(update={"bout": bout})
         return settings if self.pairs is None else with_count(settings, self.pairs)
 

@@ -16,7 +16,7 @@ RULES = {  # the most important first
     "out of range": prune.TOO_FAR,
     "illogical": prune.ILLOGICAL,
 }
-COMBINATIONS = 32  # of flaws
+COMBINATIONS = 2 * prune.LEAVES  # of flaws
 NODES, KEPT, PUT_UP, COUNTS = COMBINATIONS, COMBINATIONS + 1, COMBINATIONS + 2, COMBINATIONS + 3
 
 

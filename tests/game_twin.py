@@ -91,6 +91,8 @@ class Toy:
     defence_range: float = 3.0
     tip_radius: float = 0.03
     catch: float = 0.0
+    arena: float = 0.0
+    halts: list[list[list[tuple[float, float]]]] | None = None  # of each state; None: all rest
     stagger_from: float = 5.2
     fall_from: float = 10.0
 
@@ -102,6 +104,7 @@ class Toy:
     def game(self) -> kernels.Game:
         moves = self.moves
         tips = [tip for move in moves for tip in move.tips]
+        ways = [way for of in self.ways_to_rest for way in of]
         hull, trunk, ring, reach = zip(*(self.bounds(m) for m in moves))
         end = np.array([m.track[-1, 2] for m in moves])
         weights = np.stack([side.style.as_array() for side in self.sides])
@@ -143,12 +146,16 @@ class Toy:
             np.array([tip.blow for tip in tips], np.int64),
             np.array(last, np.int64),
             np.array(reach, float),
+            np.cumsum([0, *(len(of) for of in self.ways_to_rest)]),
+            np.cumsum([0, *(len(way) for way in ways)]),
+            np.array([place for way in ways for place in way], float).reshape(-1, 2),
             self.stride,
             np.full(2, self.facing),
             self.attack_range,
             self.defence_range,
             self.tip_radius,
             self.catch,
+            self.arena,
             self.stagger_from,
             self.fall_from,
             np.array([self.vulnerable(b) for b in range(SPHERES)]),
@@ -179,6 +186,10 @@ class Toy:
             np.column_stack([move.track[:, :2], off.max(axis=1) + 1e-6]),
             (0, 0, max(tips, default=0.0) + 1e-6),
         )
+
+    @property
+    def ways_to_rest(self) -> list[list[list[tuple[float, float]]]]:
+        return [[[]]] * len(self.choices) if self.halts is None else self.halts
 
     @property
     def most(self) -> int:
@@ -254,8 +265,8 @@ class Toy:
         return Fighter(move, time, time + self.moves[move].duration, anchor)
 
     def flaws(self, me: Fighter, other: Fighter, move: int, time: int) -> list[bool]:
-        """Of section V-C in its order: what an action does wrong. The first is of the last frame
-        alone, the second of all frames looked at."""
+        """What an action does wrong: it leaves the arena; it runs out of it; then of section V-C in
+        its order, the first of the last frame alone, the second of all frames looked at."""
         mine = self.begin(move, time, self.place(me, time))
         looked = sorted({*range(self.stride, mine.end - time, self.stride), mine.end - time})
 
@@ -280,7 +291,10 @@ class Toy:
             and opposing.last_tip is not None
             and other.begun + opposing.last_tip >= time
         )
+        leaves, runs_out = self.out_of_the_arena(mine)
         return [
+            leaves,
+            runs_out,
             overlap(mine.end),
             any(overlap(time + t) for t in looked),
             bool(off > self.facing),
@@ -288,16 +302,38 @@ class Toy:
             kind == DEFENCE and not attacked,
         ]
 
+    def out_of_the_arena(self, mine: Fighter) -> tuple[bool, bool]:
+        """Whether an action leaves the arena; or ends so that nobody comes to rest in it."""
+        if self.arena == 0.0:
+            return False, False
+
+        def beyond(x: float, z: float) -> float:
+            return max(math.hypot(x, z) - self.arena, 0.0)
+
+        looked = range(mine.end, mine.begun, -self.stride)
+        farthest = max(beyond(*self.place(mine, t)[:2]) for t in looked)
+        if farthest > beyond(*mine.anchor[:2]) + 1e-9:
+            return True, False
+        end = self.place(mine, mine.end)
+        for way in self.ways_to_rest[self.moves[mine.move].into]:
+            places = [planar_apply(end, np.array([x, 0.0, z])) for x, z in way]
+            if not any(beyond(p[0], p[2]) for p in places):
+                return False, False
+        return False, True
+
     def kept(self, flaws: list[list[bool]]) -> list[int]:
         """Those that do nothing wrong; else those that pass the more important rules."""
+        left = list(range(len(flaws)))
+        for edge in (0, 1):  # of the arena; where none can keep to it all else counts as ever
+            left = [n for n in left if not flaws[n][edge]] or left
         # Penetration: "if none of the actions can avoid such penetrations, ... at the last frame".
-        inside = 1 if any(not f[1] for f in flaws) else 0
-        ordered = [[f[inside], *f[2:]] for f in flaws]
+        inside = 3 if any(not flaws[n][3] for n in left) else 2
+        ordered = {n: [flaws[n][inside], *flaws[n][4:]] for n in left}
         for rules in (4, 3, 2, 1):
-            passing = [n for n, f in enumerate(ordered) if not any(f[:rules])]
+            passing = [n for n, f in ordered.items() if not any(f[:rules])]
             if passing:
                 return passing
-        return list(range(len(flaws)))
+        return left
 
     # As tests.reference.game_tree plays it -------------------------------------------------------
 
@@ -330,6 +366,9 @@ class Toy:
                 comp += style.suitability * float(np.float32(self.suits[k, other.move]))  # Eq. 7
             if p == 0:
                 comp -= self.tired.get(k, 0.0)
+            if self.arena:
+                mine = both[p]
+                comp -= 1e6 * max(math.hypot(*self.place(mine, mine.end)[:2]) - self.arena, 0.0)
             coop += side.asked.get(k, 0) * style.requirement  # Eq. 10
             edges.append(Edge(k, comp if p == 0 else -comp, coop, Moment(after)))
         return edges
@@ -511,6 +550,17 @@ def random_toy(seed: int, brawl: bool) -> tuple[Toy, Moment]:
         )
     )
     return toy, here
+
+
+def fenced(toy: Toy, now: Moment, seed: int) -> None:
+    """Put an arena about the middle, so that some actions lead out of it."""
+    rng = np.random.default_rng(seed)
+    far = max(math.hypot(*toy.place(f, f.end)[:2]) for f in now.fighters)
+    toy.arena = max(far + rng.normal(0, 0.2), 0.1)
+    toy.halts = [
+        [[tuple(rng.normal(0, 0.2, 2)) for _ in range(rng.integers(0, 3))] for _ in range(ways)]
+        for ways in rng.integers(0, 3, len(toy.choices))
+    ]
 
 
 def turned(now: Moment, toy: Toy, by: tuple[float, float, float]) -> Moment:

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kumite import mocap as mocap_files
-from kumite.control.game_tree import SEARCH, GameTree, Player
+from kumite.control.game_tree import SEARCH, GameTree, Player, halts
 from kumite.control.styles import STYLES, Style
 from kumite.errors import KumiteError
 from kumite.graph import ActionTable, Library, build_action_library
@@ -22,6 +22,7 @@ from kumite.kernels import moves as kernels
 from kumite.kernels.game import expand, flaws_of, leaves
 from kumite.kernels.moves import ATTACK, DEFENCE, NOTHING
 from kumite.kernels.search import empty_children
+from kumite.rotation import planar_apply
 from tests import toys
 from tests.game_twin import (
     STANCE,
@@ -32,6 +33,7 @@ from tests.game_twin import (
     Tip,
     Toy,
     as_state,
+    fenced,
     random_toy,
     standing,
     still,
@@ -85,6 +87,14 @@ def same_edges(toy: Toy, now: Moment) -> None:
 @given(st.integers(0, 10**6), st.booleans())
 def test_expand_and_leaves_as_the_twin(seed: int, brawl: bool):
     toy, now = random_toy(seed, brawl)
+    same_edges(toy, now)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10**6), st.booleans())
+def test_in_an_arena_as_the_twin(seed: int, brawl: bool):
+    toy, now = random_toy(seed, brawl)
+    fenced(toy, now, seed)
     same_edges(toy, now)
 
 
@@ -338,6 +348,85 @@ def test_defences_while_nobody_attacks_are_pruned():
     assert kept_of(moves, [0, 2], 2.0, opposing=1, end=5) == [0]  # it came at -1
 
 
+# In an arena: a round one of 2 m, the searcher looks along z from z = ``at``; the other is far off
+# on its other side, so that all but the edge is as it should be.
+BACK, AHEAD, FAR_AHEAD, RUN, ROUND_AND_BACK = range(1, 6)
+
+
+def kept_at(at: float, choices: list[int], arena: float = 2.0, **more) -> list[int]:
+    there = np.linspace((0, 0, 0), (0, 0.6, 0), 7)
+    out_and_in = np.concatenate([there, there[-2::-1]])
+    moves = [
+        still(10),
+        walk(10, (0, -0.5, 0)),
+        walk(10, (0, 0.5, 0)),
+        walk(10, (0, 1.0, 0)),
+        walk(10, (0, 0.5, 0), into=1),
+        Move(out_and_in, np.stack([planar_apply(t, STANCE) for t in out_and_in])),
+    ]
+    toy = Toy(moves, [choices, [STAND]], sides=(Side(FREE), Side(FREE)), arena=arena, **more)
+    toy.facing = math.pi
+    me, other = standing(STAND, 0, (0, at, 0), toy), standing(STAND, 5, (0, -1.9, 0), toy)
+    return [c.action for c in expanded(toy, Moment((me, other)))]
+
+
+@pytest.mark.jit_off
+def test_who_would_leave_the_arena_does_not():
+    every = [STAND, BACK, AHEAD, FAR_AHEAD, ROUND_AND_BACK]
+    assert kept_at(0.0, every) == every
+    assert kept_at(1.2, every) == [STAND, BACK, AHEAD, ROUND_AND_BACK]  # 2.2 m is outside
+    assert kept_at(1.45, every) == [STAND, BACK, AHEAD]  # on its way: 2.05 m
+    assert kept_at(1.6, every) == [STAND, BACK]
+    assert kept_at(1.6, every, arena=0.0) == every
+    assert kept_at(1.6, every, arena=100.0) == every
+
+
+def test_who_is_outside_goes_no_farther_and_loses_by_staying():
+    every = [STAND, BACK, AHEAD, FAR_AHEAD]
+    assert kept_at(2.3, every) == [STAND, BACK]
+    assert kept_at(2.3, [AHEAD, FAR_AHEAD]) == [AHEAD, FAR_AHEAD]  # nothing else is left
+    moves = [still(10), walk(10, (0, -0.1, 0))]
+    toy = Toy(moves, [[0, 1]], sides=(Side(FREE), Side(FREE)), arena=2.0, facing=math.pi)
+    me, other = standing(0, 0, (0, 2.3, 0), toy), standing(0, 5, (0, 0, 0), toy)
+    stays, returns = expanded(toy, Moment((me, other)))
+    assert (stays.comp, returns.comp) == pytest.approx((-3e5, -2e5))  # 10⁶ a metre
+
+
+@pytest.mark.jit_off
+def test_who_runs_keeps_room_to_stop():
+    """After RUN nobody rests but 0.3 m farther, or 0.3 m aside."""
+    ahead, aside = [(0.0, 0.2), (0.0, 0.3)], [(0.3, 0.0)]
+    assert kept_at(1.1, [STAND, RUN], halts=[[[]], [ahead]]) == [STAND, RUN]
+    assert kept_at(1.3, [STAND, RUN], halts=[[[]], [ahead]]) == [STAND]  # 2.1 m
+    assert kept_at(1.3, [STAND, RUN], halts=[[[]], [ahead, aside]]) == [STAND, RUN]
+    assert kept_at(1.3, [FAR_AHEAD, RUN], halts=[[[]], [ahead]]) == [RUN]  # leaving is worse
+    assert kept_at(1.3, [STAND, RUN], halts=[[[]], []]) == [STAND]  # never at rest
+
+
+def test_ways_to_rest():
+    """Running goes on running or slows down; who walks may stand. State 2 is a trap: no way."""
+    STANDS, WALKS, RUNS, TRAP = range(4)
+    stretches = [  # from, to, m ahead
+        (STANDS, STANDS, 0.0),
+        (STANDS, WALKS, 0.5),
+        (WALKS, STANDS, 0.4),
+        (WALKS, RUNS, 1.0),
+        (RUNS, RUNS, 1.5),
+        (RUNS, WALKS, 1.2),
+        (TRAP, TRAP, 1.0),
+    ]
+    action_start = np.searchsorted([s[0] for s in stretches], np.arange(5))
+    target = np.array([s[1] for s in stretches])
+    track = np.concatenate([np.linspace((0, 0, 0), (0, s[2], 0), 3) for s in stretches])
+    starts, place_starts, places = halts(
+        action_start, np.arange(7), target, np.arange(8) * 3, track, stride=1
+    )
+    assert starts.tolist() == [0, 1, 2, 3, 3]
+    assert place_starts.tolist() == [0, 0, 2, 6]
+    assert places[:, 0].tolist() == [0.0] * 6
+    assert places[:, 1] == pytest.approx([0.2, 0.4, 0.6, 1.2, 1.4, 1.6])
+
+
 def test_of_what_is_wrong_the_less_important_is_put_up_with():
     moves = [still(10), jab(), still(10, kind=DEFENCE), walk(10, (0, 0, math.pi))]
     assert kept_of(moves, [1], 2.0) == [1]
@@ -531,14 +620,17 @@ def sizes(tree: GameTree, depth: int) -> tuple[list[int], list[int], dict[str, i
     return found.nodes.tolist(), found.considered.tolist(), below
 
 
+@pytest.mark.parametrize("arena", [False, True])
 @pytest.mark.parametrize("seed", range(10))
-def test_what_is_wrong_with_an_action_is_told(seed: int):
+def test_what_is_wrong_with_an_action_is_told(seed: int, arena: bool):
     toy, now = random_toy(seed, seed % 2 == 0)
+    if arena:
+        fenced(toy, now, seed)
     p = toy.player(now)
     me, other = now.fighters[p], now.fighters[1 - p]
     for k in toy.offered(now):
         expected = sum(
-            2 ** (4 - n) for n, wrong in enumerate(toy.flaws(me, other, k, me.end)) if wrong
+            2 ** (6 - n) for n, wrong in enumerate(toy.flaws(me, other, k, me.end)) if wrong
         )
         assert flaws_of(toy.game(), as_state(now), k) == expected
 

@@ -41,8 +41,14 @@ RESTLESSNESS = 15.0  # score that an action loses for each recent one of its kin
 MEMORY = 8  # actions back that "recently" goes
 GOAL_EVERY = 0.25  # s
 CALM = ("transition", "idle")  # kinds of who waits
+GOES_NOWHERE = 0.15  # m that one may move and still be at rest
+HALT_EVERY = 0.1  # s between places on a way to come to rest
+MOST_HALTS = 8  # such ways of a state
 OUTSIDE = 1e12  # score that an action loses which is not in the set: more than all else together
 COOPERATIVE = [HEADING, PLACE, REQUIREMENT]  # columns of weights
+
+
+FREE = ("catch", "arena")  # of the rules, which there need not be: 0
 
 
 @dataclass(frozen=True)
@@ -55,12 +61,13 @@ class Rules:
     defence_range: float = 3.0  # m
     tip_radius: float = 0.03  # m, of a fist's front
     catch: float = 0.0  # m between two that counts as caught; 0: nobody is
+    arena: float = 0.0  # m from the middle of the scene that nobody is to go beyond; 0: everywhere
     stagger_from: float = 5.2  # m/s of a blow that staggers
     fall_from: float = 10.0  # m/s of a blow that fells
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if not np.isfinite(value) or value < 0 or (value == 0 and name != "catch"):
+            if not np.isfinite(value) or value < 0 or (value == 0 and name not in FREE):
                 raise KumiteError(f"rules: {name} {value}; expected more than 0")
 
 
@@ -119,6 +126,8 @@ class Decision:
 
 
 FLAWS = {
+    prune.LEAVES: "leaves the arena",
+    prune.RUNS_OUT: "runs out of the arena",
     prune.ENDS_INSIDE: "ends inside",
     prune.OVERLAPS: "overlaps",
     prune.TURNED_AWAY: "turned away",
@@ -282,6 +291,7 @@ class GameTree:
             float(r.defence_range),
             float(r.tip_radius),
             float(r.catch),
+            float(r.arena),
             float(r.stagger_from),
             float(r.fall_from),
             vulnerable,
@@ -451,6 +461,68 @@ def _moves(library: Library) -> kernels.Moves:
         _ranks(library)[windows[frame[row], limb]],
         last_tip.astype(np.int64),
         reach,
+        *halts(
+            table.action_start,
+            table.stretch,
+            table.target,
+            start,
+            track,
+            max(1, round(clips.fps * HALT_EVERY)),
+        ),
+    )
+
+
+def halts(
+    first: np.ndarray,
+    ways: np.ndarray,
+    target: np.ndarray,
+    start: np.ndarray,
+    track: np.ndarray,
+    stride: int,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Ways to come to rest from each state [N + 1], where their places begin [W + 1], and those
+    [Q, 2], seen from the state. A state offers stretches ``ways`` [A] from its ``first`` [N + 1]
+    on, which lead into ``target`` [L] along rows of ``track`` [R, 3] from ``start`` [L + 1] on.
+
+    At rest is who can go on with stretches that go nowhere: a way without places. From any other
+    state the few that take least room, each a stretch and then a way from where it leads: what is
+    left of a way is a way again. A state from which nobody comes to rest has none.
+    """
+    room = np.maximum.reduceat(np.linalg.norm(track[:, :2], axis=1), start[:-1])
+    stays = room[ways] <= GOES_NOWHERE
+    owner = np.repeat(np.arange(len(first) - 1), np.diff(first))
+    rests = np.ones(len(first) - 1, dtype=bool)
+    while True:
+        found = np.zeros_like(rests)
+        found[owner[stays & rests[target[ways]]]] = True
+        found &= rests
+        if np.array_equal(found, rests):
+            break
+        rests = found
+    out: list[list[np.ndarray]] = [[np.zeros((0, 3))] if r else [] for r in rests.tolist()]
+    while True:
+        more: dict[int, list[np.ndarray]] = {}
+        for state in [n for n, known in enumerate(out) if not known]:
+            for k in ways[first[state] : first[state + 1]].tolist():
+                known = out[int(target[k])]
+                if not known:
+                    continue
+                rows = np.arange(int(start[k + 1]) - 1, int(start[k]), -stride)[::-1]
+                more.setdefault(state, []).extend(
+                    np.concatenate([track[rows], planar_compose(track[rows[-1]], way)])
+                    for way in known
+                )
+        if not more:
+            break
+        for state, found_ways in more.items():
+            far = [float(np.linalg.norm(way[:, :2], axis=1).max()) for way in found_ways]
+            out[state] = [found_ways[i] for i in np.argsort(far, kind="stable")[:MOST_HALTS]]
+    flat = [way for of in out for way in of]
+    places = np.concatenate([np.zeros((0, 3)), *flat])
+    return (
+        np.cumsum([0, *(len(of) for of in out)]),
+        np.cumsum([0, *(len(way) for way in flat)]),
+        np.ascontiguousarray(places[:, :2]),
     )
 
 

@@ -21,7 +21,7 @@ from kumite.body.mesh import ROLES
 from kumite.clip import MOST_FRAMES, NO_PARENT, Skeleton
 from kumite.errors import KumiteError
 from kumite.rotation import continuous, from_yaw, slerp
-from kumite.scene.look import car
+from kumite.scene.look import Part, shown
 from kumite.scene.recording import Recording
 from kumite.scene.stage import recorded_objects
 
@@ -270,11 +270,11 @@ def _unit(xyzw: np.ndarray) -> list[float]:
 
 
 def _add_objects(document: _Document, recording: Recording) -> None:
-    """Balls, which share one unit sphere, and boxes, each a car."""
+    """Balls, which share one unit sphere, boxes, each a car, and lines."""
     sphere = None
     for o, thing in enumerate(recorded_objects(recording)):
-        if thing.size is not None:
-            mesh, scale = _add_car(document, thing.name, thing.size), None
+        if parts := shown(thing):
+            mesh, scale = _add_parts(document, thing.name, parts), None
         else:
             mesh = sphere = _add_sphere(document) if sphere is None else sphere
             scale = [thing.radius] * 3
@@ -298,9 +298,9 @@ def _add_sphere(document: _Document) -> int:
     )
 
 
-def _add_car(document: _Document, name: str, size: tuple[float, float, float]) -> int:
+def _add_parts(document: _Document, name: str, parts: tuple[Part, ...]) -> int:
     primitives = []
-    for part in car(size):
+    for part in parts:
         rough = _ROUGHNESS.get(part.name, 0.8)
         material = document.add_material(f"{name} {part.name}", part.colour, rough)
         primitives.append(

@@ -19,7 +19,7 @@ from kumite.clip import Skeleton, facing_frame, forward_kinematics
 from kumite.errors import KumiteError, unknown
 from kumite.kernels.raster import draw_triangles
 from kumite.rotation import from_yaw, rotate
-from kumite.scene.look import car
+from kumite.scene.look import shown
 from kumite.scene.recording import Recording
 from kumite.scene.stage import SceneObject, recorded_objects
 
@@ -217,8 +217,9 @@ def ball(centre: np.ndarray, radius: float, colour: np.ndarray = OBJECT_COLOUR) 
 
 
 def object_shapes(thing: SceneObject, centre: np.ndarray) -> list[Shape]:
-    """A ball, or of a box a car, with its middle at a place [3] m."""
-    if thing.size is None:
+    """A ball, of a box a car, or a line, with its middle at a place [3] m."""
+    parts = shown(thing)
+    if not parts:
         return [ball(centre, thing.radius)]
     turn = from_yaw(thing.yaw)
     return [
@@ -228,7 +229,7 @@ def object_shapes(thing: SceneObject, centre: np.ndarray) -> list[Shape]:
             part.faces,
             np.tile(part.colour, (len(part.vertices), 1)),
         )
-        for part in car(thing.size)
+        for part in parts
     ]
 
 

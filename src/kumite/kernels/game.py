@@ -41,7 +41,7 @@ from kumite.kernels.moves import (
     touch,
 )
 from kumite.kernels.policy import wrapped
-from kumite.kernels.prune import fewest, judge, way_of, worst_allowed
+from kumite.kernels.prune import beyond, fence, fewest, judge, way_of, worst_allowed
 from kumite.kernels.style import (
     DISTANCE,
     FACING,
@@ -59,6 +59,7 @@ from kumite.kernels.style import (
 
 ROOM = 0.8  # m that is kept to others who are not the opponent
 CROWDED = 1e4  # score that is lost where there is none of it
+OUTSIDE = 1e6  # score that is lost for each metre outside the arena: a blow of 10 m/s
 
 
 @lean_kernel
@@ -337,6 +338,8 @@ def choices(game, state, children, before, way, flaws):
             rules,
             flaws,
         )
+        if rules.arena != 0.0:
+            fence(stretches, x, z, yaw, hasty, moves, rules, flaws)
         if fewest(flaws) == 0:  # whatever has a flaw goes, and it makes no difference which
             break
     limit = worst_allowed(flaws)
@@ -370,6 +373,10 @@ def choices(game, state, children, before, way, flaws):
         else:
             comp, coop = edge(states[count], before, p, moves, rules, want)
         comp += weights[p, SUITABILITY] * want.suits[k, opposing]
+        if rules.arena != 0.0:
+            row = moves.start[k] + moves.duration[k]
+            out = beyond(x, z, yaw, moves.track[row, 0], moves.track[row, 1], rules.arena)
+            comp -= OUTSIDE * max(out, 0.0)
         action[count], comps[count] = k, sign * comp
         # Of the way to a check point counts what is gained: few long actions are no better.
         coops[count] = coop - coop_here + weights[p, REQUIREMENT] * want.asked[p, k]
@@ -395,6 +402,8 @@ def look_at(game, state, stretches, way, flaws):
     stands = way_of(first, last, frame, moves, rules.stride, way)
     facing = rules.facing[p]
     judge(stretches, first, last, frame, way, stands, attacked, facing, False, moves, rules, flaws)
+    if rules.arena != 0.0:
+        fence(stretches, x, z, yaw, False, moves, rules, flaws)
 
 
 @kernel

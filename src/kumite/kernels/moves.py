@@ -23,8 +23,6 @@ TRUNK = 4  # spheres that must not overlap: head, chest, belly, pelvis; the rest
 SPHERES = 8  # B: the trunk's, forearms and gloves
 HEAD = 0
 IDLE, ATTACK, DEFENCE, OTHER = range(4)
-ILLOGICAL, TOO_FAR, TURNED_AWAY, OVERLAPS, ENDS_INSIDE = 1, 2, 4, 8, 16
-"""What is wrong with an action (section V-C), the least important first."""
 FLINCH, STAGGER, FALL, SIZES = range(4)
 
 
@@ -55,6 +53,9 @@ class Moves(NamedTuple):
     tip_blow: np.ndarray  # [P] number of the blow, ascending in time
     last_tip: np.ndarray  # [L] frames, or NOTHING
     reach: np.ndarray  # [L, 3] circles that hold all tips and the places a frame earlier
+    halt_start: np.ndarray  # [N + 1] ways to come to rest, of each state
+    halt_place_start: np.ndarray  # [W + 1]
+    halt_place: np.ndarray  # [Q, 2] m, along such ways
 
 
 class Rules(NamedTuple):
@@ -66,6 +67,7 @@ class Rules(NamedTuple):
     defence_range: float  # m
     tip_radius: float  # m
     catch: float  # m between two that counts as caught; 0: nobody is
+    arena: float  # m from the middle of the scene that nobody is to go beyond; 0: everywhere
     stagger_from: float  # m/s
     fall_from: float  # m/s
     vulnerable: np.ndarray  # [B] of each part
@@ -120,6 +122,9 @@ def parts(game):
             game.tip_blow,
             game.last_tip,
             game.reach,
+            game.halt_start,
+            game.halt_place_start,
+            game.halt_place,
         ),
         Rules(
             game.stride,
@@ -128,6 +133,7 @@ def parts(game):
             game.defence_range,
             game.tip_radius,
             game.catch,
+            game.arena,
             game.stagger_from,
             game.fall_from,
             game.vulnerable,

@@ -8,10 +8,12 @@ from __future__ import annotations
 import numpy as np
 
 from kumite.kernels.jit import lean_kernel
-from kumite.kernels.moves import ATTACK, DEFENCE, TRUNK, carried, touch
+from kumite.kernels.moves import ATTACK, DEFENCE, TRUNK, carried, compose, touch
 
-ILLOGICAL, TOO_FAR, TURNED_AWAY, OVERLAPS, ENDS_INSIDE = 1, 2, 4, 8, 16
-"""What is wrong with an action, the least important first."""
+ILLOGICAL, TOO_FAR, TURNED_AWAY, OVERLAPS, ENDS_INSIDE, RUNS_OUT, LEAVES = 1, 2, 4, 8, 16, 32, 64
+"""What is wrong with an action, the least important first; the last two of an arena."""
+
+ROUNDING = 1e-9  # m: who stands outside does not leave
 
 
 @lean_kernel
@@ -96,6 +98,61 @@ def judge(stretches, first, last, frame, way, stands, attacked, facing, hasty, m
 
 
 @lean_kernel
+def beyond(x, z, yaw, u, w, arena):
+    """How far [m] point (u, w) of frame (x, z, yaw) is beyond the edge of the arena."""
+    x, z, _ = compose(x, z, yaw, u, w, 0.0)
+    return np.sqrt(x * x + z * z) - arena
+
+
+@lean_kernel
+def leaves(k, x, z, yaw, moves, rules):
+    """Whether stretch k leads out of the arena from (x, z, yaw), or farther out from outside.
+
+    The last frame and every ``stride`` before it are looked at: straight between two places inside
+    is inside.
+    """
+    hull, track, arena = moves.hull, moves.track, rules.arena
+    if beyond(x, z, yaw, hull[k, 0], hull[k, 1], arena) < -hull[k, 2]:  # nor does any of the body
+        return False
+    most = max(np.sqrt(x * x + z * z) - arena, 0.0) + ROUNDING
+    first, lasts = moves.start[k], moves.duration[k]
+    for i in range(lasts, 0, -rules.stride):
+        if beyond(x, z, yaw, track[first + i, 0], track[first + i, 1], arena) > most:
+            return True
+    return False
+
+
+@lean_kernel
+def runs_out(k, x, z, yaw, moves, rules):
+    """Whether nobody can come to rest in the arena after stretch k, begun in (x, z, yaw)."""
+    row, node, places = moves.start[k] + moves.duration[k], moves.successor[k], moves.halt_place
+    track, starts = moves.track, moves.halt_place_start
+    x, z, yaw = compose(x, z, yaw, track[row, 0], track[row, 1], track[row, 2])
+    for way in range(moves.halt_start[node], moves.halt_start[node + 1]):
+        inside = True
+        for i in range(starts[way], starts[way + 1]):
+            if beyond(x, z, yaw, places[i, 0], places[i, 1], rules.arena) > 0.0:
+                inside = False
+                break
+        if inside:
+            return False
+    return True
+
+
+@lean_kernel
+def fence(stretches, x, z, yaw, hasty, moves, rules, flaws):
+    """Add to flaws [n] which of stretches [n], begun in (x, z, yaw), leave the arena, or end so
+    fast that nothing is left but to leave it; if ``hasty`` only where no flaw has been found."""
+    for n in range(stretches.shape[0]):
+        if hasty and flaws[n]:
+            continue
+        if leaves(stretches[n], x, z, yaw, moves, rules):
+            flaws[n] |= LEAVES
+        elif runs_out(stretches[n], x, z, yaw, moves, rules):
+            flaws[n] |= RUNS_OUT
+
+
+@lean_kernel
 def fewest(flaws):
     """The least of flaws [n]."""
     least = flaws[0]
@@ -108,12 +165,14 @@ def fewest(flaws):
 def worst_allowed(flaws):
     """The flaws that must be put up with: those of no action but the least important (section V-C).
 
-    Actions whose flaws are below the number returned are kept. Where all overlap, OVERLAPS is taken
-    from all of them: what counts then is the last frame, and the other flaws as ever.
+    Actions whose flaws are below the number returned are kept. Where all overlap that do not leave
+    the arena, OVERLAPS is taken from all: what counts then is the last frame, and the other flaws
+    as ever. Where all leave it, LEAVES is, and where all others run out of it, RUNS_OUT.
     """
-    if fewest(flaws) >= OVERLAPS:
-        for n in range(flaws.shape[0]):
-            flaws[n] -= OVERLAPS
+    for edge in (LEAVES, RUNS_OUT, OVERLAPS):
+        if fewest(flaws) >= edge:
+            for n in range(flaws.shape[0]):
+                flaws[n] &= ~edge
     least = fewest(flaws)
     limit = 1
     while limit <= least:

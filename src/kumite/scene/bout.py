@@ -38,7 +38,7 @@ from kumite.scene.controls import (
     check_orders,
     style_controls,
 )
-from kumite.scene.fighters import NEAREST, BoutSettings
+from kumite.scene.fighters import ARENA, NEAREST, BoutSettings
 from kumite.scene.floor import Floor, Landing
 from kumite.scene.reactions import MOST_PHYSICAL, Reactions
 from kumite.scene.recording import Event
@@ -82,6 +82,9 @@ class BoutScene:
                 wanted=cue.wanted or (), unwanted=cue.unwanted or (), only=cue.only or ()
             )
             check_orders(f"cue of {cue.who}", self.tree, orders, cue.route())
+        self._edge: list[SceneObject] = []
+        if self.bout.arena is not None:
+            self._edge.append(SceneObject(ARENA, np.zeros(3), self.bout.arena, line=True))
         self.reset(seed)
 
     @property
@@ -167,7 +170,7 @@ class BoutScene:
 
     @property
     def objects(self) -> list[SceneObject]:
-        return self.story.objects
+        return self.story.objects + self._edge
 
     @property
     def root_position(self) -> np.ndarray:

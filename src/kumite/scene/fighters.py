@@ -21,6 +21,7 @@ Depth = Annotated[int, Field(ge=1, le=DEEPEST)]
 
 
 NEAREST = "nearest"  # of those who are after one, or of all
+ARENA = "arena"  # what its edge is called among the objects
 
 
 class Settings(BaseModel):
@@ -145,6 +146,7 @@ class BoutSettings(Settings):
     attack_range: Positive = 1.0  # m
     defence_range: Positive = 3.0  # m
     catch: Annotated[Finite, Field(ge=0)] = 0.0  # m; 0: nobody is caught
+    arena: Annotated[float, Field(gt=0, le=FARTHEST)] | None = None  # m, radius; None: no edge
     scatter: Annotated[Finite, Field(ge=0, le=10)] = (
         0.0  # m by which the seed moves who begins where
     )
@@ -155,4 +157,5 @@ class BoutSettings(Settings):
 
     def rules(self) -> Rules:
         apart = {"library", "facing_deg", "scatter", "scatter_deg", "reactions"}
-        return Rules(facing=radians(self.facing_deg), **self.model_dump(exclude=apart))
+        told = self.model_dump(exclude=apart, exclude_none=True)
+        return Rules(facing=radians(self.facing_deg), **told)

@@ -1,4 +1,4 @@
-"""What a box on the stage looks like: a car."""
+"""What a box on the stage looks like, a car, and what the edge of an arena."""
 
 from __future__ import annotations
 
@@ -6,21 +6,52 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kumite.scene.stage import SceneObject
+
 PAINT = (0.30, 0.34, 0.40)  # sRGB
 GLASS = (0.12, 0.15, 0.19)
 TYRE = (0.06, 0.06, 0.07)
+CHALK = (0.80, 0.80, 0.76)
 WHEEL_SIDES = 16
+LINE_WIDTH = 0.06  # m, of an arena's edge
+LINE_SIDES = 96
+LIFT = 0.008  # m of a line above the floor
 
 
 @dataclass(frozen=True)
 class Part:
-    """Triangles of one colour. The box's middle is the origin, its length lies along +Z."""
+    """Triangles of one colour. The thing's middle is the origin, its length lies along +Z."""
 
     name: str
     colour: tuple[float, float, float]  # sRGB, 0..1
     vertices: np.ndarray  # [V, 3] float32 m
     normals: np.ndarray  # [V, 3] float32
     faces: np.ndarray  # [P, 3] int32
+
+
+def shown(thing: SceneObject) -> tuple[Part, ...]:
+    """What a thing looks like; a ball is no parts."""
+    if thing.line:
+        return (line(thing.radius),)
+    return () if thing.size is None else car(thing.size)
+
+
+def line(radius: float) -> Part:
+    """A ring on the floor, of this radius [m] in its middle."""
+    around = 2.0 * np.pi * np.arange(LINE_SIDES) / LINE_SIDES
+    way = np.stack([np.sin(around), np.zeros(LINE_SIDES), np.cos(around)], axis=1)
+    half = min(0.5 * LINE_WIDTH, 0.5 * radius)
+    vertices = np.concatenate([(radius - half) * way, (radius + half) * way])
+    vertices[:, 1] = LIFT
+    i = np.arange(LINE_SIDES)
+    j = (i + 1) % LINE_SIDES
+    faces = np.concatenate(
+        [
+            np.stack([i, i + LINE_SIDES, j + LINE_SIDES], axis=1),
+            np.stack([i, j + LINE_SIDES, j], axis=1),
+        ]
+    )
+    return _part("line", CHALK, [(vertices, np.tile([0.0, 1.0, 0.0], (len(vertices), 1)), faces)])
 
 
 def car(size: tuple[float, float, float]) -> tuple[Part, ...]:

@@ -76,6 +76,7 @@ def record(
             "object_radius": {thing.name: thing.radius for thing in scene.objects},
             "object_size": {o.name: list(o.size) for o in scene.objects if o.size is not None},
             "object_yaw": {o.name: o.yaw for o in scene.objects if o.size is not None},
+            "object_line": [o.name for o in scene.objects if o.line],
             "aims_at": scene.settings.aims,
             "scene": scene.settings.model_dump(mode="json"),
         },

@@ -7,6 +7,7 @@ import os
 from collections import Counter
 from functools import cached_property
 from importlib import resources
+from math import hypot
 from pathlib import Path
 from typing import Annotated
 
@@ -17,6 +18,7 @@ from kumite.errors import KumiteError
 from kumite.scene.balls import BallsSettings
 from kumite.scene.dodge import DodgerSettings, DodgeSettings, DodgersSettings
 from kumite.scene.fighters import (
+    ARENA,
     FARTHEST,
     NEAREST,
     BoutSettings,
@@ -196,6 +198,17 @@ class SceneSettings(Settings):
     def _fit_fighters(self) -> SceneSettings:
         names = self.names
         names = (*names, *(v.name for v in self.vehicle))
+        bout = self.bout or BoutSettings()
+        if bout.arena is not None:
+            names = (*names, ARENA)
+            for f in self.fighters:
+                far = hypot(*(abs(x) + bout.scatter for x in f.position))
+                if far > bout.arena:
+                    raise ValueError(
+                        f"position of {f.name}: {far:g} m from the middle"
+                        f"{' with scatter' if bout.scatter else ''}, but bout.arena is "
+                        f"{bout.arena:g} m; expected it to begin inside"
+                    )
         twice = sorted(n for n, times in Counter(names).items() if times > 1)
         if twice:
             raise ValueError(f"names used twice: {', '.join(twice)}")

@@ -17,7 +17,8 @@ RADIUS = 0.1  # m of an object of which a recording does not say it
 
 @dataclass
 class SceneObject:
-    """A thing in the scene that is no character: a ball to hit, or with a size a box."""
+    """A thing in the scene that is no character: a ball to hit, with a size a box, or a line on
+    the floor about a place."""
 
     name: str
     position: np.ndarray  # [3] m, where its middle is now
@@ -25,6 +26,7 @@ class SceneObject:
     draggable: bool = False
     size: tuple[float, float, float] | None = None  # m: width, height and length of a box
     yaw: float = 0.0  # rad, the way a box's length points
+    line: bool = False  # round, of that radius
 
 
 def recorded_objects(recording: Recording) -> list[SceneObject]:
@@ -39,6 +41,7 @@ def recorded_objects(recording: Recording) -> list[SceneObject]:
             float(radii.get(name, RADIUS)),
             size=_size(sizes[name]) if name in sizes else None,
             yaw=float(yaws.get(name, 0.0)),
+            line=name in told.get("object_line", ()),
         )
         for o, name in enumerate(recording.objects)
     ]

@@ -8,7 +8,7 @@ import numpy as np
 import viser
 
 from kumite.rotation import from_yaw
-from kumite.scene.look import car
+from kumite.scene.look import Part, shown
 from kumite.scene.stage import SceneObject
 from kumite.studio.palette import RGB, mix
 from kumite.studio.ring import STAGE
@@ -22,7 +22,7 @@ SETTLE_HALFLIFE = 0.4  # s; the handle rests where the object hangs, not where i
 
 
 class Targets:
-    """A sphere or car for every object, and a gizmo at each one that can be dragged."""
+    """A sphere, car or line for every object, and a gizmo at each one that can be dragged."""
 
     def __init__(
         self,
@@ -32,9 +32,9 @@ class Targets:
     ) -> None:
         self._objects = tuple(o.name for o in objects)
         self._shown = [
-            _add_sphere(server, f"{STAGE}/object/{i}", o)
-            if o.size is None
-            else _add_car(server, f"{STAGE}/object/{i}", o, o.size)
+            _add_parts(server, f"{STAGE}/object/{i}", o, parts)
+            if (parts := shown(o))
+            else _add_sphere(server, f"{STAGE}/object/{i}", o)
             for i, o in enumerate(objects)
         ]
         self._gizmos: dict[int, viser.TransformControlsHandle] = {}
@@ -98,13 +98,13 @@ def _add_sphere(server: viser.ViserServer, name: str, thing: SceneObject) -> vis
     )
 
 
-def _add_car(
-    server: viser.ViserServer, name: str, thing: SceneObject, size: tuple[float, float, float]
+def _add_parts(
+    server: viser.ViserServer, name: str, thing: SceneObject, parts: tuple[Part, ...]
 ) -> viser.FrameHandle:
     frame = server.scene.add_frame(
         name, show_axes=False, position=thing.position, wxyz=from_yaw(thing.yaw)
     )
-    for part in car(size):
+    for part in parts:
         r, g, b = (round(255 * c) for c in part.colour)
         server.scene.add_mesh_simple(
             f"{name}/{part.name}", part.vertices, part.faces, color=(r, g, b), flat_shading=True
