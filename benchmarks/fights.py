@@ -208,6 +208,8 @@ class Followed:
     apart: float  # m, the closest of different pairs
     down: float  # share of pairs whose second lies at the end
     early: float  # share in which it fell before the last check point was gone for
+    felled: np.ndarray  # s, when each of those seconds fell that did
+    from_end: float  # m, mean, of a pair's middle from the last check point then
 
 
 def followed(job: Job, f: Fight) -> Followed:
@@ -215,6 +217,9 @@ def followed(job: Job, f: Fight) -> Followed:
     middle = 0.5 * (f.ground[:, ::2] + f.ground[:, 1::2])
     pairs, people = range(middle.shape[1]), range(len(routes))
     sent = float(routes[0].points[-2].time or 0.0)  # when the last check point is gone for
+    falls = [(k, fell[0]) for k, fell in enumerate(f.falls[1::2]) if fell]
+    ends = np.array([r.places[-1] for r in routes[::2]])
+    there = [np.hypot(*(middle[round(t * f.fps) - 1, k] - ends[k])) for k, t in falls]
     return Followed(
         float(np.mean([_off_path(middle[:, k], routes[2 * k]) for k in pairs])),
         float(np.mean([_off_time(middle[:, k], routes[2 * k], f.fps) for k in pairs])),
@@ -223,6 +228,8 @@ def followed(job: Job, f: Fight) -> Followed:
         _between_pairs(f.ground),
         float(np.mean(f.down[1::2])),
         float(np.mean([any(t < sent for t in fell) for fell in f.falls[1::2]])),
+        np.array([t for _, t in falls]),
+        float(np.mean(there)) if there else np.nan,
     )
 
 

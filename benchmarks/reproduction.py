@@ -341,10 +341,18 @@ def spiral(seeds: int) -> str:
     off, late, apart = (
         [getattr(w, n) for w in found] for n in ("middle_off", "middle_late", "apart")
     )
+    when, there = [w.felled.mean() for w in found], [w.from_end for w in found]
     rows = [
         ("blue lies at the end", "100 %", f"{_spread(down, '.0f')} %", _said(min(down) == 100)),
         ("blue fell before it was to", "0 %", f"{_spread(early, '.0f')} %", _said(max(early) == 0)),
-        ("a pair's middle to its path", "< 0.7 m", f"{_spread(off)} m", _said(max(off) < 0.7)),
+        ("when it fell, mean of a run", "", f"{_spread(when, '.1f')} s", ""),
+        (
+            "a pair's middle to the last check point then, mean of a run",
+            "within its radius, 0.7 m",
+            f"{_spread(there)} m",
+            _said(max(there) <= 0.7),
+        ),
+        ("a pair's middle to its path", "≤ 0.5 m", f"{_spread(off)} m", _said(max(off) <= 0.5)),
         ("to where it is due", "", f"{_spread(late)} m", ""),
         (
             "closest of different pairs",

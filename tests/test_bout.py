@@ -167,6 +167,25 @@ def test_each_check_point_that_is_missed_is_told_though_one_before_it_was_reache
     assert reached.data["point"] == 0 and reached.data["late_by"] > 0
 
 
+def test_two_share_a_check_point_by_the_middle_between_them(actions: Library):
+    """It is reached though neither is there, and each is to stand on its own side of it."""
+    middle = np.array([0.3, 0.1])
+    for shared in (True, False):
+        point = {"place": tuple(middle), "time": 20.0, "radius": 0.2, "middle": shared}
+        red = {"point": [point], "position": (0.3, 0.8)}
+        scene = _fight(actions, red=red, blue={"point": [point], "position": (0.3, -0.6)})
+        goals = [scene._player(k).goal for k in range(2)]
+        place = scene.root_position[:, [0, 2]]
+        for k, goal in enumerate(goals):
+            assert goal is not None
+            aside = (place[k] - place[1 - k]) / np.linalg.norm(place[k] - place[1 - k])
+            half = 0.5 * scene.players[k].style.preferred_distance
+            assert np.allclose(goal, middle + shared * half * aside)
+        scene.step()
+        arrived = [p is not None and p.arrived is not None for p in scene.progress]
+        assert arrived == [shared, shared]
+
+
 def test_wrong_fights_are_refused(actions: Library, library: Library):
     with pytest.raises(KumiteError, match="one of frames; expected one of whole actions"):
         BoutScene(load_scene("boxing"), library)

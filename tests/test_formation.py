@@ -9,7 +9,8 @@ import pytest
 from pydantic import ValidationError
 
 from kumite.errors import KumiteError
-from kumite.scene import SceneSettings, load_scene, with_count
+from kumite.graph import builtin_library
+from kumite.scene import BoutScene, SceneSettings, load_scene, with_count
 from kumite.scene.formation import APART, PairsSettings
 
 SIDES = {"one": {"name": "red"}, "other": {"name": "blue"}}
@@ -89,6 +90,46 @@ def test_those_of_a_pair_face_each_other_or_their_way():
     assert first is not None and second is not None
     assert second.points[-1].time == pytest.approx((first.points[-1].time or 0.0) + 1.5)
     assert len(second) == len(first) + 1  # it begins at a place of its own
+
+
+def test_those_who_face_each_other_share_check_points_by_the_middle_between_them():
+    for facing in ("rival", "way"):
+        points = [p for f in _pairs(count=2, facing=facing).fighters() for p in f.point]
+        assert all(p.middle == (facing == "rival") for p in points)
+
+
+@pytest.mark.slow
+def test_at_the_last_check_point_of_the_spiral_red_knocks_blue_down():
+    scene = BoutScene(
+        with_count(load_scene("spiral"), 24), builtin_library(None, level="actions"), seed=1
+    )
+    routes = [r for r in scene.routes[::2] if r is not None]
+    off, felled = [], []  # m of the middle of a pair from its path; m from its end, s
+    for _ in range(round(30.0 * scene.fps)):
+        told = len(scene.events)
+        scene.step()
+        ground = scene.root_position[:, [0, 2]].astype(float)
+        middle = 0.5 * (ground[::2] + ground[1::2])
+        off.append([_off(at, route.places) for at, route in zip(middle, routes)])
+        for e in scene.events[told:]:
+            if e.kind == "reaction" and e.data["size"] == "fall":
+                pair = scene.names.index(e.character) // 2
+                end = routes[pair].places[-1]
+                felled.append((np.hypot(*(middle[pair] - end)), e.frame / scene.fps))
+    lie = [scene.tree.labels[k] == "fall" for k in scene.stretch]
+    assert sum(lie[1::2]) >= 23 and not any(lie[::2])
+    assert np.mean(off) <= 0.5
+    where, when = np.array(felled).T
+    assert where.mean() < 0.7 and where.max() < 1.5
+    assert when.min() > float(routes[0].points[-2].time or 0.0) and np.median(when) < 21.0
+
+
+def _off(at: np.ndarray, places: np.ndarray) -> float:
+    """How far a place is from the line through others [m]."""
+    way = np.diff(places, axis=0)
+    along = ((at - places[:-1]) * way).sum(axis=1) / (way**2).sum(axis=1)
+    nearest = places[:-1] + np.clip(along, 0.0, 1.0)[:, None] * way
+    return float(np.linalg.norm(at - nearest, axis=1).min())
 
 
 def test_what_is_required_is_so_at_the_last_check_point_only():

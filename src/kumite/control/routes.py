@@ -30,6 +30,7 @@ class CheckPoint:
     require: tuple[str, ...] = ()  # labels, ways or kinds of actions to perform there, each once
     refuse: tuple[str, ...] = ()  # those not to perform on the way there, nor there
     radius: float = RADIUS  # m: so near is there
+    middle: bool = False  # it is a place for the middle between a fighter and its opponent
 
     def __post_init__(self) -> None:
         put = object.__setattr__

@@ -294,12 +294,21 @@ class BoutScene:
             return replace(player, only=("idle",) if "idle" in self.tree.choices else ())
         if progress is None:
             return player
+        goal = progress.ahead(self.frame / self.fps, GOAL_EVERY, GOALS)
         return replace(
             player,
-            goal=progress.ahead(self.frame / self.fps, GOAL_EVERY, GOALS),
+            goal=goal + self._beside(k) if _is_shared(progress) else goal,
             wanted=(*player.wanted, *progress.wanted),
             unwanted=(*player.unwanted, *progress.unwanted),
         )
+
+    def _beside(self, k: int) -> np.ndarray:
+        """From the middle between fighter k and its opponent to where it would stand [2] m: on the
+        side on which it is, at half the distance it prefers. Two cannot be in one place.
+        """
+        place = self.cast.root_position[:, [0, 2]]
+        way = place[k] - place[self.floor.opponent[k]]
+        return 0.5 * self.players[k].style.preferred_distance * way / max(np.hypot(*way), 1e-9)
 
     def _begin(self, k: int, stretch: int) -> None:
         """Character k begins a stretch now, whatever it does."""
@@ -394,6 +403,8 @@ class BoutScene:
             if progress is None or progress.done:
                 continue
             place = self.cast.root_position[k]
+            if _is_shared(progress):
+                place = 0.5 * (place + self.cast.root_position[self.floor.opponent[k]])
             reached = progress.update((float(place[0]), float(place[2])), seconds, self._done[k])
             self._done[k] = set()
             if reached is not None:
@@ -413,3 +424,9 @@ class BoutScene:
 
     def _event(self, kind: str, k: int, **data) -> None:
         self.events.append(Event(self.frame, kind, self.names[k], data))
+
+
+def _is_shared(progress: Progress) -> bool:
+    """Whether a route's check point of now is for the middle between a fighter and its opponent."""
+    points = progress.route.points
+    return points[min(progress.index, len(points) - 1)].middle

@@ -38,6 +38,7 @@ class CheckPointSettings(Settings):
     require: tuple[str, ...] = ()  # kinds or labels of actions
     refuse: tuple[str, ...] = ()
     radius: Positive = 0.5  # m within which it is reached
+    middle: bool = False  # by the middle between the fighter and its opponent
 
 
 def check_points(points: tuple[CheckPointSettings, ...]) -> Route | None:

@@ -34,7 +34,8 @@ class MemberSettings(Manner):
 class PairsSettings(Settings):
     """Pairs whose paths are laid out so that no two of them meet.
 
-    facing: whether those of a pair face each other when they begin, or along their way.
+    facing: whether those of a pair face each other when they begin, or along their way. Who face
+    each other share their path: its check points are places of the middle between them.
     spiral: rings of pairs all round a centre, that turn and spread. crossing: half of the pairs go
     along +X, the others along +Z, so timed that wherever two paths cross the second pair comes
     ``spacing`` / ``speed`` later.
@@ -118,6 +119,7 @@ class PairsSettings(Settings):
                     require=member.require if n == last else (),
                     refuse=member.refuse if n < last else (),
                     radius=self.radius,
+                    middle=self.facing == "rival",
                 )
                 for n, (p, t) in enumerate(zip(places, times))
             )
