@@ -109,7 +109,9 @@ class _File(BaseModel):
 def save_spheres(path: Path | str, spheres: Spheres, skeleton: Skeleton) -> None:
     """A TOML file of them, one ``[[sphere]]`` each, that can be edited."""
     roles = {j: role for role, j in skeleton.roles.items()}
-    rows = ["# Spheres on the skeleton: joint (role or name), centre in its axes and radius in m.\n"]
+    rows = [
+        "# Spheres on the skeleton: joint (role or name), centre in its axes and radius in m.\n"
+    ]
     for j, centre, r in zip(spheres.joint.tolist(), spheres.centre.tolist(), spheres.radius):
         name = roles.get(j, skeleton.names[j])
         x, y, z = centre

@@ -99,7 +99,9 @@ def run(
     """Run a scene without drawing, record it, and print how good it is."""
     from kumite.scene import measure, record
 
-    settings = _settings(scene, count, throws)  # before any long work: what is wrong is said at once
+    settings = _settings(
+        scene, count, throws
+    )  # before any long work: what is wrong is said at once
     names = [c.name for c in (*settings.character, *settings.fighters, *settings.dodging)]
     _check_outputs(output or [], [*names, *(["the crowd"] if settings.crowd else [])])
     live = _live_scene(settings, library, seed)

@@ -45,7 +45,10 @@ class Attack:
         for what, fits in (
             ("expected at least one time and one sphere", times > 0 and spheres > 0),
             ("times must ascend", bool(np.all(np.diff(self.when) > 0))),
-            ("it is not finite", bool(np.isfinite(self.when).all() and np.isfinite(self.centre).all())),
+            (
+                "it is not finite",
+                bool(np.isfinite(self.when).all() and np.isfinite(self.centre).all()),
+            ),
             (
                 f"radii must be from {SMALLEST} to {LARGEST} m",
                 bool(np.all((self.radius >= SMALLEST) & (self.radius <= LARGEST))),

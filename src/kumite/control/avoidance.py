@@ -199,7 +199,13 @@ class AvoidanceSearch:
             float(clips.fps),
         )
         self.weighing = kernels.Weighing(
-            np.array(s.weights), s.enough, s.far, s.most, s.clearance, s.left, s.ramp,
+            np.array(s.weights),
+            s.enough,
+            s.far,
+            s.most,
+            s.clearance,
+            s.left,
+            s.ramp,
             float(self.spheres.radius.max()),
         )
         self._local = threading.local()
@@ -413,7 +419,9 @@ def _build_index(search: AvoidanceSearch) -> cells.Index:
         used = cells.gather(entries, key, of, size, cell, entry_of, entry)
         path, length = room.path[:count].copy(), room.length[:count].copy()
         middle = paths.middles(count, path, length, room.part, now, graph)
-        rows.append((path, length, room.part[:count].copy(), middle, cell[:used], entry_of[:used], entry))
+        rows.append(
+            (path, length, room.part[:count].copy(), middle, cell[:used], entry_of[:used], entry)
+        )
     per = [np.array([0, *np.cumsum([len(r[k]) for r in rows])]) for k in (1, 4, 6)]
     starts = np.concatenate([r[5] + begin for r, begin in zip(rows, per[2])])
     edges = int(max((r[1].max() for r in rows if len(r[1])), default=1))

@@ -51,9 +51,7 @@ def build_avoidance_library(
     contacts, strikes = find_contacts(clips), find_strikes(clips)
     parts = chosen_parts(clips, contacts, avoidance, progress)
     progress("comparing poses")
-    transitions = find_avoiding_transitions(
-        clips, parts, every=every, offered=offered, worst=worst
-    )
+    transitions = find_avoiding_transitions(clips, parts, every=every, offered=offered, worst=worst)
     progress("folding the graph")
     told = {"level": "avoidance", "every": every, "offered": offered, "worst": worst}
     return with_parts(folded(clips, contacts, strikes, transitions, parts, told), avoidance)

@@ -289,16 +289,16 @@ def time_path(path, count, part, aim, scale, now, graph, weighing, scratch):
     it comes and goes in ramps.
     """
     ramp = weighing.ramp * graph.fps
-    frames = fill(
-        count + 1, scratch.upto, scratch.adjustable, ramp, scratch.at, scratch.weight
-    )
+    frames = fill(count + 1, scratch.upto, scratch.adjustable, ramp, scratch.at, scratch.weight)
     if frames < 0:
         return 0, scale
     if scale != 1.0:
         whole = middle(path, count, part, now, graph)
         want = aim * graph.fps
         scale = solve(scratch.at, scratch.weight, frames, whole, want, ramp, now.slowness)
-        scale = max(scale, 0.5 / weighing.most)  # the dropped, too, are timed without standing still
+        scale = max(
+            scale, 0.5 / weighing.most
+        )  # the dropped, too, are timed without standing still
     phase_times(
         scratch.at, scratch.weight, frames, scale, ramp, now.slowness, graph.fps, scratch.when
     )
@@ -335,7 +335,9 @@ def certainly_hit(part, frame, px, py, pz, masks):
 
 
 @lean_kernel
-def weigh(path, count, part, main, aim, now, graph, volumes, attacks, weighing, masks, scratch, out):
+def weigh(
+    path, count, part, main, aim, now, graph, volumes, attacks, weighing, masks, scratch, out
+):
     """Evaluate a candidate: Eqs. 2 to 10. Returns what became of it; out [8] is then
 
     (e, e_avoidance, e_body, e_timescale, e', d, d0, s). main: the attack to be avoided, whose time
@@ -377,7 +379,11 @@ def weigh(path, count, part, main, aim, now, graph, volumes, attacks, weighing, 
             for i in range(spheres):
                 if attacks.radius[main, i] < masks.least:
                     continue
-                px, py, pz = attacks.centre[n, i, 0], attacks.centre[n, i, 1], attacks.centre[n, i, 2]
+                px, py, pz = (
+                    attacks.centre[n, i, 0],
+                    attacks.centre[n, i, 1],
+                    attacks.centre[n, i, 2],
+                )
                 if certainly_hit(part, frame, px, py, pz, masks):
                     return CULLED
     first = graph.begins[part]
@@ -416,7 +422,11 @@ def weigh(path, count, part, main, aim, now, graph, volumes, attacks, weighing, 
             away = m == main and k == count and begins <= phase <= ends
             for i in range(attacks.count[m]):
                 r = attacks.radius[m, i]
-                px, py, pz = attacks.centre[n, i, 0], attacks.centre[n, i, 1], attacks.centre[n, i, 2]
+                px, py, pz = (
+                    attacks.centre[n, i, 0],
+                    attacks.centre[n, i, 1],
+                    attacks.centre[n, i, 2],
+                )
                 qx, qy, qz = px, py, pz
                 if seen:
                     qx = attacks.centre[n - 1, i, 0]
@@ -426,9 +436,7 @@ def weigh(path, count, part, main, aim, now, graph, volumes, attacks, weighing, 
                     low, high = group[g], group[g + 1]
                     # Only a group that can be nearer than what is nearest so far is looked into.
                     if far_off(qx, qy, qz, before_bound, px, py, pz, bound, g, seen, r) < least:
-                        put_body(
-                            volumes, low, high, row, share, after, scratch.anchor[k], body
-                        )
+                        put_body(volumes, low, high, row, share, after, scratch.anchor[k], body)
                         if seen:
                             put_body(
                                 volumes, low, high, old_row, old_share, old_after,
@@ -450,9 +458,7 @@ def weigh(path, count, part, main, aim, now, graph, volumes, attacks, weighing, 
                     if lower < was:
                         was = min(was, gap(px, py, pz, r, scratch.still, radius, low, high))
                     if away and lower < 0.0:
-                        put_body(
-                            volumes, low, high, row, share, after, scratch.anchor[k], body
-                        )
+                        put_body(volumes, low, high, row, share, after, scratch.anchor[k], body)
                         more = overlap(
                             px, py, pz, r, scratch.still, body, radius, weighing.left, low, high
                         )

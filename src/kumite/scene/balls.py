@@ -81,7 +81,9 @@ class Balls:
         self.thrown += 1
         return n
 
-    def step(self, roots: np.ndarray, capsules: np.ndarray) -> list[tuple[int, int, int, np.ndarray]]:
+    def step(
+        self, roots: np.ndarray, capsules: np.ndarray
+    ) -> list[tuple[int, int, int, np.ndarray]]:
         """One frame; hits: (ball, character, part, its velocity [3] m/s). capsules [2, 2, K, P, 3]: ends a and b
         of everybody's parts, before and now.
         """
