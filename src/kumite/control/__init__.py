@@ -1,5 +1,7 @@
 """Controllers: given what a character sees, choose its next action."""
 
+from kumite.control.attack import Attack, thrown
+from kumite.control.avoidance import Avoidance, AvoidanceRules, AvoidanceSearch, Standing
 from kumite.control.combination import (
     HIT_DIRECTIONS,
     POSITIONS,
@@ -37,6 +39,10 @@ __all__ = [
     "POSITIONS",
     "STYLES",
     "Annotations",
+    "Attack",
+    "Avoidance",
+    "AvoidanceRules",
+    "AvoidanceSearch",
     "Behaviour",
     "CheckPoint",
     "CombinationTable",
@@ -49,6 +55,7 @@ __all__ = [
     "Reached",
     "Route",
     "Skill",
+    "Standing",
     "Station",
     "Style",
     "TargetGrid",
@@ -71,6 +78,7 @@ __all__ = [
     "strike_grid",
     "style",
     "take_place",
+    "thrown",
     "trained",
     "write_table",
 ]
