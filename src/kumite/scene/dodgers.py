@@ -120,8 +120,9 @@ class Dodgers:
                 self._begin_search(k, mind, frame)
         for k, mind in enumerate(self.minds):
             cast.rate[k] = self._rate(mind, now)
-        for k in cast.waiting.tolist():
-            self._go_on(k, self.minds[k])
+        while len(waiting := cast.waiting):  # again, where an edge is shorter than a quick frame
+            for k in waiting.tolist():
+                self._go_on(k, self.minds[k])
         cast.advance()
 
     def _rate(self, mind: Mind, now: float) -> float:
@@ -174,9 +175,8 @@ class Dodgers:
         if found.outcome not in menace.told or found.outcome == Outcome.FOUND:
             menace.told.add(found.outcome)
             self.tell("avoidance", k, **_told(found, menace))
-        if found.outcome in (Outcome.WIDE, Outcome.LATE):
-            menace.settled = True
-            return
+        # Wide of where it is may be right where it goes next; too late remains so.
+        menace.settled = found.outcome == Outcome.LATE
         if found.outcome != Outcome.FOUND or found.plan is None:
             return
         for path, part in ((found.path, found.plan.part), *found.others):
