@@ -158,7 +158,7 @@ class AvoidanceSearch:
         *,
         spheres: Spheres | None = None,
     ) -> None:
-        """spheres: the body's volume; by default laid to cover it. Errors: nothing to avoid with."""
+        """spheres: the body's volume; by default laid to cover it. Errors: no part to use."""
         self.library, self.settings = library, settings or AvoidanceRules()
         clips = library.clips
         self.spheres = spheres or lay_spheres(clips.skeleton)
@@ -397,8 +397,8 @@ def _build_index(search: AvoidanceSearch) -> cells.Index:
         )  # fmt: skip
         if count > MOST_PATHS:
             raise KumiteError(
-                f"avoidance: more than {MOST_PATHS} paths lead to an avoidance within {s.horizon} s "
-                "of a state; expected fewer (a shorter horizon, or fewer transitions)"
+                f"avoidance: more than {MOST_PATHS} paths lead to an avoidance within "
+                f"{s.horizon} s of a state; expected fewer (a shorter horizon, fewer transitions)"
             )
         now = kernels.Now(
             planar_inverse(search.library.clips.facing[frame]), float(frame), frame, NONE, 1.0

@@ -113,7 +113,8 @@ def find(
     if use_index and state >= 0:
         count = look_up(
             state, facing, ahead, low, high, attacks, main, weighing.widest, index, stamp,
-            room.turn, room.seen, room.seen_path, room.found, path[present:], length[present:], part[present:],
+            room.turn, room.seen, room.seen_path, room.found,
+            path[present:], length[present:], part[present:],
         )  # fmt: skip
         count += present
         if count <= length.shape[0]:

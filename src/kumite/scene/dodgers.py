@@ -3,6 +3,7 @@
 The search runs in the background (Oshita & Masaoka 2011, section 6): what it finds is taken up a
 fixed number of frames later, so that a scene shows the same whether a machine is fast or slow. The
 present edge goes on meanwhile; if it ends, another is begun, and paths without that are dropped.
+Only what would be taken up in the very next frame is waited for.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from kumite.rotation import planar_compose, wrap_angle
 from kumite.synthesis import Cast
 
 LATENCY = 1  # frames after which what a search has found is taken up
+PATIENCE = 1  # frames before it is due at which a search is waited for, at the end of an edge
 SOONEST = 4.0  # s before its end from which an attack is minded
 FEW = 3  # of the best ways to go on that are drawn from
 HOME = 0.5  # rad for each metre away from home
@@ -122,7 +124,13 @@ class Dodgers:
             cast.rate[k] = self._rate(mind, now)
         while len(waiting := cast.waiting):  # again, where an edge is shorter than a quick frame
             for k in waiting.tolist():
-                self._go_on(k, self.minds[k])
+                mind = self.minds[k]
+                # Who must choose now and would know better in the next frame waits for it: an
+                # edge taken at random here would make what is found stale.
+                if mind.search is not None and mind.due <= frame + PATIENCE:
+                    self._take_up(k, mind, now)
+                    cast.rate[k] = self._rate(mind, now)
+                self._go_on(k, mind)
         cast.advance()
 
     def _rate(self, mind: Mind, now: float) -> float:
