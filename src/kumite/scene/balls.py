@@ -13,7 +13,7 @@ from kumite.errors import KumiteError
 from kumite.kernels import ball as kernels
 from kumite.kernels.blow import NO_HIT
 from kumite.rotation import rotate
-from kumite.scene.fighters import Finite, Positive, Settings
+from kumite.scene.fighters import Finite, Settings
 from kumite.scene.stage import SceneObject
 
 POOL = 12  # balls that are seen at once: the oldest is thrown again
@@ -84,8 +84,9 @@ class Balls:
     def step(
         self, roots: np.ndarray, capsules: np.ndarray
     ) -> list[tuple[int, int, int, np.ndarray]]:
-        """One frame; hits: (ball, character, part, its velocity [3] m/s). capsules [2, 2, K, P, 3]: ends a and b
-        of everybody's parts, before and now.
+        """One frame; hits: (ball, character, part, its velocity [3] m/s).
+
+        capsules [2, 2, K, P, 3]: ends a and b of everybody's parts, before and now.
         """
         dt, s = 1.0 / self.fps, self.settings
         fly = np.flatnonzero(self.used)

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from kumite.body import lay_body
-from kumite.control.avoidance import AvoidanceSearch, AvoidanceRules
+from kumite.control.avoidance import AvoidanceRules, AvoidanceSearch
 from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.scene.balls import Balls, BallsSettings, aimed, capsules_of, velocity_to
@@ -17,6 +17,7 @@ from kumite.scene.fighters import Finite, Metres, Name, Settings
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.recording import Event
 from kumite.scene.stage import SceneObject
+from kumite.synthesis.cast import FASTEST
 
 AIM_SPREAD = 0.03  # m by which throws miss the middle of what they are aimed at
 RECOIL = 0.01  # m that a struck segment gives way per m/s of the ball
@@ -60,7 +61,7 @@ class DodgeSettings(Settings):
     body: Annotated[Finite, Field(ge=0)] = 1.0
     timescale: Annotated[Finite, Field(ge=0)] = 1.0
     clearance: Annotated[Finite, Field(ge=0, le=1)] = 0.04  # m
-    most: Annotated[Finite, Field(ge=1, le=16)] = 4.0
+    most: Annotated[Finite, Field(ge=1, le=FASTEST)] = 4.0
     latency: Annotated[int, Field(ge=1, le=120)] = 1  # frames until a search is taken up
     index: bool = True
     culling: bool = True

@@ -16,7 +16,7 @@ from pydantic import Field, model_validator
 from kumite import toml
 from kumite.errors import KumiteError
 from kumite.scene.balls import BallsSettings
-from kumite.scene.dodge import DodgerSettings, DodgeSettings, DodgersSettings
+from kumite.scene.dodge import DodgerSettings, DodgersSettings, DodgeSettings
 from kumite.scene.fighters import (
     ARENA,
     FARTHEST,
