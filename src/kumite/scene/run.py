@@ -77,6 +77,7 @@ def record(
             "object_size": {o.name: list(o.size) for o in scene.objects if o.size is not None},
             "object_yaw": {o.name: o.yaw for o in scene.objects if o.size is not None},
             "object_line": [o.name for o in scene.objects if o.line],
+            "object_thrown": [o.name for o in scene.objects if o.thrown],
             "aims_at": scene.settings.aims,
             "scene": scene.settings.model_dump(mode="json"),
         },
