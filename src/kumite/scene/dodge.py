@@ -102,11 +102,15 @@ class DodgeScene:
         self._search_once()
 
     def _search_once(self) -> None:
-        """What the first search would compile or load must not hold up a picture."""
+        """What first searches would compile or load must not hold up a picture."""
         goal, yaw = self.root_position[0], self.cast.facing[0, 2]
         before = np.array([np.sin(yaw), 0.0, np.cos(yaw)])
         attack = thrown(goal + 4.0 * before, -8.0 * before, 0.1, gravity=0.0, seconds=1.0)
-        self.search.search(self.dodgers.standing(0), [attack], 0.0)
+        standing, parts = self.dodgers.standing(0), self.search.graph.part_of
+        for attacks in ([attack], [attack, attack]):  # arrays of other kinds
+            self.search.search(standing, attacks, 0.0)
+        edge = int(np.flatnonzero(np.diff(parts))[0])
+        self.search.timed(standing, (edge,), int(parts[edge]), 1.0, 0.0)
 
     def reset(self, seed: int) -> None:
         """Start again from the beginning, with a seed."""

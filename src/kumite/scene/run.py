@@ -8,6 +8,7 @@ import numpy as np
 
 from kumite.errors import KumiteError
 from kumite.scene.bout import BoutScene
+from kumite.scene.dodge import DodgeScene
 from kumite.scene.live import LiveScene
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.metrics import source_skate
@@ -17,7 +18,7 @@ MOST_BYTES = 16e9  # of one recording
 
 
 def record(
-    scene: LiveScene | BoutScene,
+    scene: LiveScene | BoutScene | DodgeScene,
     seconds: float,
     progress: Callable[[float], None] = lambda share: None,
 ) -> Recording:

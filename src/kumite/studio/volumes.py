@@ -76,7 +76,7 @@ class Volumes:
             self._attacks.pop(number)[1].remove()
         for number, attack in picture.attacks.items():
             if number not in self._attacks:
-                handle = self._add(f"attack/{number}", attack_volume(attack), ATTACK_COLOUR)
+                handle = self._add(f"attack {number}", attack_volume(attack), ATTACK_COLOUR)
                 self._attacks[number] = attack, handle
         if picture.plan is None or picture.left is not None:
             self._plan = None
