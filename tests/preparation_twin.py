@@ -50,7 +50,7 @@ def places(low, high, middle, width, count, shift):
     """Places [K, 2] (distance, angle) of a cell."""
     found = []
     for k in range(count):
-        part = (0.5 + shift + k * (math.sqrt(5) - 1) / 2) % 1.0
+        part = (shift + (k + 1) * (math.sqrt(5) - 1) / 2) % 1.0
         found.append((low + (k + 0.5) / count * (high - low), middle + (part - 0.5) * width))
     return np.array(found)
 
@@ -66,9 +66,7 @@ def carried(displacement, seen):
 def cell(distance, angle, step, distances, angles):
     ring = min(math.floor(distance / step), distances - 1)
     width = 2 * math.pi / angles
-    nearest = min(
-        range(angles), key=lambda t: abs(math.remainder(angle - t * width, 2 * math.pi))
-    )
+    nearest = min(range(angles), key=lambda t: abs(math.remainder(angle - t * width, 2 * math.pi)))
     return ring, nearest
 
 
@@ -82,13 +80,11 @@ class Exact:
         count, levels = motions.displacement.shape[:2]
         self.actions = [(m, a) for m in range(count) for a in range(levels)]
         self.goals = [(r, t) for r in range(1, s.goal_distances) for t in range(s.goal_angles)]
-        self.sources = [
-            (r, t) for r in range(s.source_distances) for t in range(s.source_angles)
-        ]
-        G, I, U = len(self.goals), len(self.sources), len(self.actions)
-        self.to_goal = np.zeros((U, G, G + 1))  # the last: the goal
-        self.gain = np.zeros((U, G))
-        self.to_source = np.zeros((U, I, I))
+        self.sources = [(r, t) for r in range(s.source_distances) for t in range(s.source_angles)]
+        goals, sources, actions = len(self.goals), len(self.sources), len(self.actions)
+        self.to_goal = np.zeros((actions, goals, goals + 1))  # the last: the goal
+        self.gain = np.zeros((actions, goals))
+        self.to_source = np.zeros((actions, sources, sources))
         for u, (m, a) in enumerate(self.actions):
             displacement = motions.displacement[m, a]
             for g, (r, t) in enumerate(self.goals):
@@ -112,7 +108,7 @@ class Exact:
                     there = cell(d, angle, s.source_step, s.source_distances, s.source_angles)
                     self.to_source[u, i, self.sources.index(there)] += 1 / s.places
         self.levels = s.all_levels
-        self.shape = (len(self.rows), len(self.levels), G, I)
+        self.shape = (len(self.rows), len(self.levels), goals, sources)
         inner = np.array([r == 0 for r, _ in self.sources])
         self.reaches = ~inner[:, None] & inner[None, :]  # [I, I]
 

@@ -97,7 +97,7 @@ class PreparationSettings:
     explore: float = 0.1  # ε
     exploring_starts: bool = True
     changed: float = 0.02  # learned when a batch changes the best action of fewer of the states
-    batch: int = 0  # episodes; 0: one a state
+    batch: int = 4  # episodes a state
     longest: int = 1000  # actions after which an episode is given up
 
     def __post_init__(self) -> None:
@@ -112,7 +112,7 @@ class PreparationSettings:
             ("goal_angles", 1),
             ("levels", 1),
             ("places", 1),
-            ("batch", 0),
+            ("batch", 1),
             ("longest", 1),
         ):
             value = getattr(self, field)
@@ -134,7 +134,8 @@ class PreparationSettings:
         weights = (self.facing, self.progress, self.steadiness, self.arrival)
         if not all(math.isfinite(w) and w >= 0 for w in weights):
             raise KumiteError(
-                "preparation: facing, progress, steadiness and arrival must be finite and not below 0"
+                "preparation: facing, progress, steadiness and arrival, "
+                "expected finite and not below 0"
             )
         if not (self.level_step > 0 and self.level_step * (self.levels - 1) <= 1 + 1e-9):
             raise KumiteError(
@@ -143,11 +144,13 @@ class PreparationSettings:
         if not (self.source_step > 0 and self.goal_step > 0):
             raise KumiteError("preparation: steps of distance, expected more than 0 m")
         nearest = max(
-            (self.source_distances - 1) * self.source_step, (self.goal_distances - 1) * self.goal_step
+            (self.source_distances - 1) * self.source_step,
+            (self.goal_distances - 1) * self.goal_step,
         )
         if not nearest < self.farthest < math.inf:
             raise KumiteError(
-                f"preparation: farthest {self.farthest} m, expected beyond the last cells' {nearest:g} m"
+                f"preparation: farthest {self.farthest} m, expected more than the "
+                f"{nearest:g} m where the last cells begin"
             )
 
     @property
@@ -177,7 +180,13 @@ def gradual(**changes: Any) -> PreparationSettings:
 
     With those a character stays before the source (docs/preparation-learning.md).
     """
-    given = {"arrival": 1.0, "discount": 0.9, "two_changes": True, "goal_distances": 5}
+    given: dict[str, Any] = {
+        "arrival": 1.0,
+        "discount": 0.8,
+        "two_changes": True,
+        "goal_distances": 5,
+        "settling": 10.0,
+    }
     return PreparationSettings(**{**given, **changes})
 
 
@@ -204,9 +213,7 @@ def build_process(motions: Motions, settings: PreparationSettings) -> kernels.Pr
     goal_reward = np.empty(goal_next.shape)
     source_next = np.empty((count, levels, sources, settings.places), dtype=np.int32)
     weights = kernels.Weights(settings.facing, settings.progress, settings.arrival)
-    kernels.goal_steps(
-        motions.displacement, settings.goal_cells, weights, goal_next, goal_reward
-    )
+    kernels.goal_steps(motions.displacement, settings.goal_cells, weights, goal_next, goal_reward)
     kernels.source_steps(motions.displacement, settings.source_cells, source_next)
     allowed = np.repeat(rows, levels, axis=1)
     process = kernels.Process(
@@ -322,7 +329,7 @@ class Learning:
         )
         # On a copy: an interruption anywhere in here leaves what was learned before this batch.
         learner = kernels.Learner(*(array.copy() for array in self.learner))
-        count = s.batch or self.states
+        count = s.batch * self.states
         mean, steps, seconds, lost = kernels.episodes(self.process, rates, learner, count)
         changed = float((learner.best != self.learner.best).mean())
         rows = (*self._rows, (changed, mean, steps, seconds / count, lost))
@@ -357,7 +364,7 @@ class Learning:
         settings: PreparationSettings | None = None,
         seed: int = 0,
     ) -> Learning:
-        """Taken up where it was saved. Errors: damaged; of other motions, settings, seed or code."""
+        """Taken up where it was saved. Errors: damaged; other motions, settings, seed, code."""
         self = cls(motions, settings, seed)
         header, arrays = files.load(path, LEARNING, VERSION)
         if header.get("key") != _key(motions, self.settings, seed):
@@ -399,14 +406,14 @@ class PreparationPolicy:
             raise KumiteError("preparation: expected a level of 0 to 1, distances not below 0")
         last = np.asarray(last)
         if last.dtype.kind not in "iu" or ((last < 0) | (last >= len(self.class_after))).any():
-            raise KumiteError(f"preparation: last motion, expected 0 to {len(self.class_after) - 1}")
+            raise KumiteError(
+                f"preparation: last motion, expected 0 to {len(self.class_after) - 1}"
+            )
         s = self.settings
         near = np.abs(level[..., None] - s.all_levels).argmin(axis=-1)
         goal = _cells(s.goal_cells, np.maximum(d_g, s.goal_step), theta_g) - s.goal_angles
         source = _cells(s.source_cells, d_i, theta_i)
-        motion, chosen = np.divmod(
-            self.best[self.class_after[last], near, goal, source], s.levels
-        )
+        motion, chosen = np.divmod(self.best[self.class_after[last], near, goal, source], s.levels)
         return motion, s.chosen[chosen]
 
     def at_goal(self, d_g: Any) -> np.ndarray:
@@ -498,9 +505,7 @@ def trained_preparation(
     return policy
 
 
-def _read(
-    path: Path, settings: PreparationSettings, process: kernels.Process
-) -> PreparationPolicy:
+def _read(path: Path, settings: PreparationSettings, process: kernels.Process) -> PreparationPolicy:
     header, arrays = files.load(path, KIND, VERSION)
     best = arrays["best"]
     classes, goals, sources = (
@@ -522,4 +527,3 @@ def _key(motions: Motions, settings: PreparationSettings, seed: int) -> str:
     for array in (motions.displacement, motions.duration, motions.follows):
         h.update(f"{array.dtype} {array.shape}".encode() + np.ascontiguousarray(array).tobytes())
     return h.hexdigest()
-

@@ -105,7 +105,7 @@ def place_in(polar, cell, k, count, shift):
     low = r * polar.step
     high = polar.farthest if r == polar.distances - 1 else low + polar.step
     u = (k + 0.5) / count
-    v = (0.5 + shift + k * 0.6180339887498949) % 1.0
+    v = (shift + (k + 1) * 0.6180339887498949) % 1.0
     return low + u * (high - low), (t + v - 0.5) * 2.0 * np.pi / polar.angles
 
 
