@@ -28,6 +28,13 @@ from kumite.control.policy import (
     strike,
     take_place,
 )
+from kumite.control.preparation import (
+    Motions,
+    PreparationPolicy,
+    PreparationSettings,
+    gradual,
+    trained_preparation,
+)
 from kumite.control.routes import CheckPoint, Missed, Progress, Reached, Route
 from kumite.control.styles import STYLES, Style, short_range, style
 from kumite.control.trained import cache_folder, trained
@@ -49,8 +56,11 @@ __all__ = [
     "Entry",
     "Fighters",
     "Missed",
+    "Motions",
     "Pair",
     "Policy",
+    "PreparationPolicy",
+    "PreparationSettings",
     "Progress",
     "Reached",
     "Route",
@@ -67,6 +77,7 @@ __all__ = [
     "build_table",
     "cache_folder",
     "circle",
+    "gradual",
     "heading_grid",
     "keep_off",
     "measure_worth",
@@ -80,5 +91,6 @@ __all__ = [
     "take_place",
     "thrown",
     "trained",
+    "trained_preparation",
     "write_table",
 ]
