@@ -14,7 +14,7 @@ from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.scene.balls import Balls, BallsSettings, aimed, capsules_of, velocity_to
 from kumite.scene.controls import SearchControl, search_controls
-from kumite.scene.dodgers import Dodgers
+from kumite.scene.dodgers import Dodgers, background
 from kumite.scene.fighters import Finite, Metres, Name, Settings
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.recording import Event
@@ -100,7 +100,7 @@ class DodgeScene:
         self._streams: bool | None = None  # None: as many throws as the settings say
         self.body = lay_body(self.skeleton)
         self.reset(seed)
-        self._search_once()
+        background().submit(self._search_once).result()
 
     def _search_once(self) -> None:
         """What first searches would compile or load must not hold up a picture."""

@@ -29,7 +29,7 @@ TOO_FAR = 0.6  # m from home that is not minded
 _POOL: list[ThreadPoolExecutor] = []
 
 
-def _background() -> ThreadPoolExecutor:
+def background() -> ThreadPoolExecutor:
     """One thread for all scenes: kernels in it run beside those of the picture."""
     if not _POOL:
         _POOL.append(ThreadPoolExecutor(1, "avoidance"))
@@ -132,7 +132,7 @@ class Dodgers:
         for k, mind in enumerate(self.minds):
             if mind.search is None and self._seen(mind, now):
                 mind.due = frame + self.latency
-                mind.search = _background().submit(self._search, *self._asked(k, mind, now))
+                mind.search = background().submit(self.search.search, *self._asked(k, mind, now))
         cast.advance()
 
     def _rate(self, mind: Mind, now: float) -> float:
