@@ -103,8 +103,9 @@ def sole_corners(skeleton: Skeleton, position: np.ndarray, world_wxyz: np.ndarra
         across = np.cross([0.0, 1.0, 0.0], ahead) * 0.5 * BREADTH_OF_STATURE * stance.stature
         foot = skeleton.joint(f"{side}_foot")
         front = skeleton.roles.get(f"{side}_toe", foot)
-        joint = stance.position[front]
-        ball = heel + ahead * float((joint - heel) @ ahead) if front != foot else 0.3 * heel + 0.7 * toe  # fmt: skip
+        ball = 0.3 * heel + 0.7 * toe
+        if front != foot:  # below the toe's joint
+            ball = heel + ahead * float((stance.position[front] - heel) @ ahead)
         for carrier, point in ((foot, heel), (foot, ball), (front, toe)):
             for sign in (1.0, -1.0):
                 joints.append(carrier)

@@ -15,9 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kumite.annotate.actions import KINDS, Actions
 from kumite.annotate.contacts import Contacts, velocity
 from kumite.clip import SIDES, ClipSet, forward_kinematics, freeze
-from kumite.errors import KumiteError
+from kumite.errors import KumiteError, unknown
 from kumite.rotation import (
     conjugate,
     exp,
@@ -46,7 +47,7 @@ class CycleSettings:
     place: float = 0.15  # m/s: slower gaits step on the spot
     flight: float = 0.12  # share of a cycle that no foot stands: more is no walk, but, from
     run: float = 1.5  # m/s on, a run
-    leap: float = 0.04  # m: below it, a leap if both feet are so high for half that share
+    leap: float = 0.08  # m: below it, a leap if both feet are so high for half that share
     slack: float = 0.07  # s by which an end may be moved to where it looks more like the start
 
 
@@ -174,6 +175,17 @@ def hand_cycles(
     return _measured(look, [label for label, _, _ in labelled], out)
 
 
+def labelled_frames(actions: Actions, kinds: Sequence[str] = ("transition", "idle")) -> np.ndarray:
+    """Frames [F] bool of actions of these kinds: where :func:`find_cycles` is to look."""
+    for kind in kinds:
+        if kind not in KINDS:
+            raise unknown("kind of action", kind, KINDS)
+    out = np.zeros(int(actions.clip_start[-1]), dtype=bool)
+    for start, stop, kind in zip(actions.start, actions.stop, actions.kind.tolist()):
+        out[start:stop] = KINDS[kind] in kinds
+    return out
+
+
 def closed(clips: ClipSet, start: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
     """Root [T + 1, 3] and rotations [T + 1, J, 4] of frames start … stop, made to close.
 
@@ -208,9 +220,10 @@ class _Look:
         self.height = self.position[:, pelvis, 1]
         self.standing = float(np.percentile(self.height, 90))
         hands = [skeleton.joint(f"{side}_hand") for side in SIDES]
-        speeds = [np.linalg.norm(velocity(self.position[:, j], clips), axis=1) for j in (pelvis, *hands)]  # fmt: skip
-        self.fastest = np.max(speeds, axis=0)
-        parts = [[skeleton.roles.get(f"{side}_{p}", skeleton.joint(f"{side}_foot")) for p in ("foot", "toe")] for side in SIDES]  # fmt: skip
+        moving = [velocity(self.position[:, j], clips) for j in (pelvis, *hands)]
+        self.fastest = np.linalg.norm(moving, axis=2).max(axis=0)
+        feet = [skeleton.joint(f"{side}_foot") for side in SIDES]
+        parts = [[f, skeleton.roles.get(f"{side}_toe", f)] for f, side in zip(feet, SIDES)]
         self.clearance = (self.position[:, parts, 1] - contacts.resting_height).min(axis=(1, 2))
 
     def apart(self, f: int | np.ndarray, g: int | np.ndarray) -> np.ndarray:
@@ -243,11 +256,11 @@ class _Look:
         if np.all(on_ground) and speed < settings.place:
             return "stand"
         off = ~on_ground.any(axis=1)
-        gait = "walk"
         if speed > settings.run:
             gait = "run" if np.mean(off) > settings.flight else "walk"
-        elif np.mean(off & (self.clearance[start + 1 : stop + 1] > settings.leap)) > 0.5 * settings.flight:  # fmt: skip
-            gait = "leap"
+        else:
+            high = off & (self.clearance[start + 1 : stop + 1] > settings.leap)
+            gait = "leap" if np.mean(high) > 0.5 * settings.flight else "walk"
         if speed < settings.place:
             gait, way = "step", ""
         else:

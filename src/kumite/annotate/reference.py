@@ -106,7 +106,12 @@ def leg_differences(clips: ClipSet, start: int, span: slice) -> np.ndarray:
 
 
 def find_mark(
-    clips: ClipSet, start: int, stop: int, strikes: Strikes | None = None, *, share: float = DEPARTED
+    clips: ClipSet,
+    start: int,
+    stop: int,
+    strikes: Strikes | None = None,
+    *,
+    share: float = DEPARTED,
 ) -> int:
     """The first frame of the target movement in start .. stop - 1, where nobody marks it.
 

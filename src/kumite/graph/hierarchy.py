@@ -21,6 +21,8 @@ from kumite.clip import ClipSet, freeze
 from kumite.errors import KumiteError
 from kumite.graph.distance import PoseFeatures, pose_features
 from kumite.graph.table import ActionTable
+from kumite.kernels import hierarchy as kernels
+from kumite.performer.truth import Truth
 from kumite.rotation import planar_compose, planar_inverse
 
 LONGEST_LINK = 1.6  # s of capture between two cores
@@ -53,6 +55,22 @@ class Targets:
 
     def __len__(self) -> int:
         return len(self.label)
+
+
+def authored_targets(clips: ClipSet, truths: Sequence[Truth], fps: float) -> Targets:
+    """The target motions of the performer, each label once: of every one the first.
+
+    truths: of the clips of the set, in order, their frames at ``fps``. Errors: none is marked.
+    """
+    rows: dict[str, tuple[int, int, int]] = {}
+    scale = clips.fps / fps
+    for truth, first in zip(truths, clips.clip_start.tolist()):
+        for a in truth.actions:
+            if a.mark is not None and a.label not in rows:
+                rows[a.label] = tuple(first + round(f * scale) for f in (a.start, a.stop, a.mark))  # type: ignore[assignment]
+    if not rows:
+        raise KumiteError("no target motion: none of these clips marks the frame where one begins")
+    return Targets(tuple(rows), *(np.array(column) for column in zip(*rows.values())))
 
 
 @dataclass(frozen=True)
@@ -140,23 +158,33 @@ def build_hierarchy(
     frames = [np.arange(a + 1, b + 1) for a, b in zip(cores.start, cores.stop)]
     for t in range(count):
         first, last = (int(f) for f in clips.clip_start[clip[targets.start[t]] :][:2])
+        start, stop, mark = (int(x[t]) for x in (targets.start, targets.stop, targets.mark))
         slack = round(ENTRY * clips.fps)
-        starts = np.arange(
-            max(targets.start[t] - slack, first + 1), min(targets.start[t] + slack, targets.mark[t]) + 1
-        )  # fmt: skip
+        starts = np.arange(max(start - slack, first), min(start + slack, mark) + 1)
         slack = round(RETURN * clips.fps)
-        stops = np.arange(
-            max(targets.stop[t] - slack, targets.mark[t] + 1), min(targets.stop[t] + slack, last - 1) + 1
-        )  # fmt: skip
+        stops = np.arange(max(stop - slack, mark + 1), min(stop + slack, last - 1) + 1)
         for c in range(m):
             i, j, entry_distance[c, t] = _nearest(features, frames[c], starts)
             leave[c, t], entry[c, t] = frames[c][i], starts[j]
             i, j, exit_distance[c, t] = _nearest(features, stops, frames[c])
             exit_[c, t], land[c, t] = stops[i], frames[c][j]
+    links = _links(clips, features, frames)
     return Hierarchy(
-        cores, targets, leave, entry, entry_distance, exit_, land, exit_distance,
-        *_links(clips, features, frames), alike,
-    )  # fmt: skip
+        cores,
+        targets,
+        leave,
+        entry,
+        entry_distance,
+        exit_,
+        land,
+        exit_distance,
+        links[0],
+        links[1],
+        links[2],
+        links[3],
+        links[4],
+        alike,
+    )
 
 
 def pose_distances(features: PoseFeatures, a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -181,15 +209,15 @@ def _links(
     clips: ClipSet, features: PoseFeatures, frames: list[np.ndarray]
 ) -> tuple[np.ndarray, ...]:
     """Leave, first, last, land [M, M] and the distance of the best way from each core to each."""
-    m, count = len(frames), len(clips)
+    m, count, longest = len(frames), len(clips), round(LONGEST_LINK * clips.fps)
     near, which = np.empty((m, count)), np.empty((m, count), dtype=np.int64)
+    quaternion = np.ascontiguousarray(np.moveaxis(features.quaternion, 2, 0), dtype=np.float64)
+    euclidean = np.ascontiguousarray(features.euclidean.T, dtype=np.float64)
     for c in range(m):
-        for a in range(0, count, 4096):  # of all frames to all of a cycle: a part at a time
-            some = np.arange(a, min(a + 4096, count))
-            apart = pose_distances(features, some, frames[c])
-            best = np.argmin(apart, axis=1)
-            near[c, some] = apart[np.arange(len(some)), best]
-            which[c, some] = frames[c][best]
+        kernels.nearest_poses(
+            quaternion, features.weight.astype(float), euclidean, frames[c], near[c], which[c]
+        )
+    near = np.sqrt(near)
     out = tuple(np.zeros((m, m), dtype=np.int64) for _ in range(4))
     distance = np.zeros((m, m))
     for c in range(m):
@@ -200,13 +228,9 @@ def _links(
                 out[1][c, n] = out[2][c, n] = ends
                 distance[c, n] = pose_distances(features, frames[c][-1:], frames[c][:1] - 1)[0, 0]
                 continue
-            least, first, last = np.inf, 0, 0
-            for lag in range(0, round(LONGEST_LINK * clips.fps) + 1):
-                cost = np.maximum(near[c, : count - lag], near[n, lag:]) + LINK_PRICE * lag / clips.fps  # fmt: skip
-                cost[clips.clip_of_frame[: count - lag] != clips.clip_of_frame[lag:]] = np.inf
-                k = int(np.argmin(cost))
-                if cost[k] < least:
-                    least, first, last = float(cost[k]), k, k + lag
+            first, last = kernels.best_link(
+                near[c], near[n], clips.clip_of_frame, longest, LINK_PRICE / clips.fps
+            )
             out[0][c, n], out[1][c, n] = which[c, first], first
             out[2][c, n], out[3][c, n] = last, which[n, last]
             distance[c, n] = max(near[c, first], near[n, last])

@@ -16,14 +16,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-
 from numba import prange
 
-from kumite.kernels.character import decay, planar_point
+from kumite.kernels.character import LN2, decay, planar_point, wrap
 from kumite.kernels.jit import kernel, parallel_kernel
 from kumite.kernels.limb import pose_joint, product, reach
 
-LN2 = 0.6931471805599453
 SMALL_ARC = 1e-6  # 1 - cosine of half the angle: below it the arc is as good as straight
 GONE = 1e-6  # m: an offset that has faded so far is gone
 MANY = 256  # characters from which threads pay, on cores that others use too
@@ -121,12 +119,7 @@ def compose(a, x, z, yaw, out):
     """The planar transform of (x, z, yaw) first, then a [3], into ``out`` (which may be a)."""
     c, s = np.cos(a[2]), np.sin(a[2])
     px, pz = c * x + s * z + a[0], -s * x + c * z + a[1]
-    out[0], out[1], out[2] = px, pz, wrapped(a[2] + yaw)
-
-
-@kernel
-def wrapped(angle):
-    return angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
+    out[0], out[1], out[2] = px, pz, wrap(a[2] + yaw)
 
 
 @kernel
@@ -134,7 +127,7 @@ def seen_from(a, b):
     """Planar frame b [3] seen from frame a [3]."""
     c, s = np.cos(a[2]), np.sin(a[2])
     x, z = b[0] - a[0], b[1] - a[1]
-    return c * x - s * z, s * x + c * z, wrapped(b[2] - a[2])
+    return c * x - s * z, s * x + c * z, wrap(b[2] - a[2])
 
 
 @kernel
@@ -151,7 +144,7 @@ def fall_behind(lag, before, now, weight):
     go = 1.0 - weight
     compose(here, go * x, go * z, go * yaw, here)
     # lag = here · now⁻¹
-    turn = wrapped(here[2] - now[2])
+    turn = wrap(here[2] - now[2])
     c, s = np.cos(turn), np.sin(turn)
     lag[0] = here[0] - (c * now[0] + s * now[1])
     lag[1] = here[1] - (-s * now[0] + c * now[1])
@@ -284,7 +277,9 @@ def prepare_one(t, k, level, base, curve, half_life, dt, moves, build, going, ou
         left, right = build.legs[0, 2], build.legs[1, 2]
         # The feet's mean height goes from the locomotion's to the posture's: Eq. 5, but that with
         # its ΔY alone who is all prepared would go up and down with the feet of the locomotion.
-        want = (1.0 - weight) * (ankle[0, 1] + ankle[1, 1]) + weight * (base.ankle[0] + base.ankle[1])
+        want = (1.0 - weight) * (ankle[0, 1] + ankle[1, 1]) + weight * (
+            base.ankle[0] + base.ankle[1]
+        )
         height = 0.5 * (want - position[left, 1] - position[right, 1])
         place[1] = height
         for j in range(position.shape[0]):

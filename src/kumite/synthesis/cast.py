@@ -324,9 +324,7 @@ class Cast:
 def build_of(skeleton: Skeleton) -> kernels.Build:
     """The skeleton's arrays. Errors: roles of the legs that are missing."""
     legs = [[skeleton.joint(f"{s}_{p}") for p in ("thigh", "shin", "foot")] for s in SIDES]
-    return kernels.Build(
-        skeleton.parents, skeleton.offsets, np.array(legs), _below(skeleton, legs)
-    )
+    return kernels.Build(skeleton.parents, skeleton.offsets, np.array(legs), _below(skeleton, legs))
 
 
 def _below(skeleton: Skeleton, legs: list[list[int]]) -> np.ndarray:

@@ -201,13 +201,19 @@ class Preparation:
         levels = np.broadcast_to(checked_levels(level), (count,))
         like = _checked_references(reference, count, len(self.postures.wxyz))
         moves = kernels.Locomotion(
-            *(_one(a, (count, *shape)) for a, shape in (
-                (root_position, (3,)), (wxyz, self.wxyz.shape[1:]), (facing, (3,)), (ankle, (2, 3)))),
-            np.ascontiguousarray(on_ground, dtype=np.bool_).reshape(1, count, 2),
-        )  # fmt: skip
+            _one(root_position, (count, 3)),
+            _one(wxyz, self.wxyz.shape),
+            _one(facing, (count, 3)),
+            _one(ankle, (count, 2, 3)),
+            _one(on_ground, (count, 2), np.bool_),
+        )
         shown = kernels.Prepared(
-            *(a[None] for a in (self.root_position, self.wxyz, self.position, self.world_wxyz, self.facing))
-        )  # fmt: skip
+            self.root_position[None],
+            self.wxyz[None],
+            self.position[None],
+            self.world_wxyz[None],
+            self.facing[None],
+        )
         self._run(np.ascontiguousarray(levels)[None], like, moves, shown)
 
     def show_cast(
@@ -235,8 +241,9 @@ class Preparation:
         )
 
 
-def _one(array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    a = np.ascontiguousarray(array, dtype=np.float64)
+def _one(array: np.ndarray, shape: tuple[int, ...], dtype: type = np.float64) -> np.ndarray:
+    """An array of one frame. Errors: another shape."""
+    a = np.ascontiguousarray(array, dtype=dtype)
     if a.shape != shape:
         raise KumiteError(f"preparation: {list(a.shape)}, expected {list(shape)}")
     return a[None]
@@ -282,7 +289,9 @@ def prepare_clip(
     return Clip(clip.name, skeleton, clip.fps, shown.root[:, 0], shown.wxyz[:, 0], clip.notes)
 
 
-def repeat_cycle(clips: ClipSet, contacts: Contacts, cycles: Cycles, cycle: int, times: int) -> tuple[Clip, np.ndarray]:  # fmt: skip
+def repeat_cycle(
+    clips: ClipSet, contacts: Contacts, cycles: Cycles, cycle: int, times: int
+) -> tuple[Clip, np.ndarray]:
     """A cycle played so many times on end: a clip of T times + 1 frames and its contacts [F, 2]."""
     start, stop = int(cycles.start[cycle]), int(cycles.stop[cycle])
     root, wxyz = closed(clips, start, stop)
@@ -297,8 +306,8 @@ def repeat_cycle(clips: ClipSet, contacts: Contacts, cycles: Cycles, cycle: int,
         carry = planar_compose(carry, step)
     on_ground = contacts.on_ground[start + 1 : stop + 1]
     ground = np.concatenate([on_ground[-1:], *[on_ground] * times])
-    clip = Clip(cycles.label[cycle], clips.skeleton, clips.fps, np.concatenate(roots), np.concatenate(turns))  # fmt: skip
-    return clip, ground
+    root_position, rotations = np.concatenate(roots), np.concatenate(turns)
+    return Clip(cycles.label[cycle], clips.skeleton, clips.fps, root_position, rotations), ground
 
 
 def level_displacements(
@@ -329,7 +338,7 @@ def smooth_levels(level: np.ndarray, fps: float, *, sigma: float = SIGMA) -> np.
     level = checked_levels(level)
     if not sigma >= 0:
         raise KumiteError(f"preparation: sigma {sigma} s; expected at least 0")
-    if sigma == 0:
+    if REACH * sigma * fps < 0.5:  # it reaches no other frame
         return level.copy()
     smooth = gaussian_filter1d(level, sigma * fps, axis=0, mode="nearest", truncate=REACH)
     return np.clip(smooth, 0.0, 1.0)
