@@ -117,9 +117,9 @@ def cost(clip: Clip, postures, count: int) -> float:
     best = np.inf
     for f in range(100):
         parts = (clip.root_position[f], clip.wxyz[f], facing[f], position[f, feet], [True, False])
-        args = [np.repeat(np.asarray(p)[None], count, axis=0) for p in parts]
+        a, b, c, d, e = (np.repeat(np.asarray(p)[None], count, axis=0) for p in parts)
         begin = time.perf_counter()
-        work.show(*args, 0.5)
+        work.show(a, b, c, d, e, 0.5)
         best = min(best, time.perf_counter() - begin)
     return 1e6 * best / count
 

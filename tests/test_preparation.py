@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,14 +12,15 @@ from hypothesis import strategies as st
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation, Slerp
 
-from kumite.annotate import find_contacts, find_cycles, find_reference
+from kumite.annotate import find_contacts, find_cycles, find_reference, find_strikes
 from kumite.clip import SIDES, ClipSet, concatenate, facing_frame, forward_kinematics
 from kumite.errors import KumiteError
-from kumite.graph import authored_targets
+from kumite.graph import Library, authored_targets, build_hierarchy, hierarchy_table
 from kumite.kernels import preparation as kernels
 from kumite.performer import perform
 from kumite.rotation import angle, planar_compose, planar_inverse, rotate
 from kumite.synthesis import (
+    Cast,
     LevelFilter,
     Preparation,
     curves,
@@ -103,7 +105,7 @@ def test_weights_of_any_curve(level: float, curve: float):
 @given(st.integers(0, 2**32 - 1), st.floats(0, 1))
 @settings(max_examples=60, deadline=None)
 def test_arcs_are_scipys(seed: int, part: float):
-    q = Rotation.random(2, random_state=seed)
+    q = Rotation.from_quat(np.random.default_rng(seed).normal(size=(2, 4)))
     a, b = q.as_quat(scalar_first=True)
     ours = kernels.arc(*a, *b, part)
     theirs = Slerp([0, 1], q)(part).as_quat(scalar_first=True)
@@ -211,13 +213,14 @@ def test_a_level_that_changes_moves_without_jumps(walker: Walker):
 # Many at once -------------------------------------------------------------------------------------
 
 
-def stepped(walker: Walker, work: Preparation, f: int, count: int, level, reference=0):
+def stepped(walker: Walker, work: Preparation, f: int, count: int, level, reference: Any = 0):
     clip = walker.clip
     position = joints_of(clip)[f]
     facing = facing_frame(clip.skeleton, clip.root_position, clip.wxyz)[f]
     feet = [clip.skeleton.joint(f"{side}_foot") for side in SIDES]
-    args = (clip.root_position[f], clip.wxyz[f], facing, position[feet], walker.ground[f])
-    work.show(*(np.repeat(x[None], count, axis=0) for x in args), level, reference)
+    parts = (clip.root_position[f], clip.wxyz[f], facing, position[feet], walker.ground[f])
+    a, b, c, d, e = (np.repeat(x[None], count, axis=0) for x in parts)
+    work.show(a, b, c, d, e, level, reference)
 
 
 def test_many_characters_are_each_as_one(walker: Walker):
@@ -304,3 +307,30 @@ def test_the_filter_that_runs_is_the_one_that_looks_back():
     np.testing.assert_allclose(whole, theirs, atol=1e-12)
     with pytest.raises(KumiteError, match="sigma"):
         smooth_levels(level, 60.0, sigma=-1.0)
+
+
+def test_who_plays_the_graph_prepares_without_jumps(walker: Walker):
+    """Thirty seconds of random ways through cores, links and targets, prepared now and then."""
+    clips, contacts = walker.clips, walker.contacts
+    made = perform("targets", mirrored=False)
+    targets = authored_targets(clips, made.truth, 60.0)
+    table, _ = hierarchy_table(clips, build_hierarchy(clips, walker.cycles, targets))
+    cast = Cast(Library(clips, contacts, find_strikes(clips), table), 1)
+    cast.place(0, 0, np.zeros(3))
+    work = Preparation(clips.skeleton, 60.0, walker.postures, 1)
+    smooth, rng, before = LevelFilter(1, 60.0), np.random.default_rng(0), None
+    fastest = {"plain": 0.0, "prepared": 0.0}
+    for f in range(1800):
+        if len(cast.waiting):
+            state = int(np.searchsorted(table.state_frame, cast.stop[0]))
+            action = rng.integers(*table.action_start[state : state + 2])
+            cast.begin(np.array([0]), table.stretch[[action]])
+        cast.advance()
+        work.show_cast(cast, smooth.push(0.6 if (f // 200) % 2 else 0.0))
+        shown = {"plain": cast.position[0].copy(), "prepared": work.position[0].copy()}
+        for name, position in shown.items():
+            if before is not None:
+                step = np.linalg.norm(position - before[name], axis=1).max() * 60
+                fastest[name] = max(fastest[name], float(step))
+        before = shown
+    assert fastest["prepared"] < fastest["plain"] + 1.0
