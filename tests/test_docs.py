@@ -33,7 +33,9 @@ def test_examples_run(example: str, tmp_path: Path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("document", ["README.md", "docs/performer.md", "docs/reactions.md"])
+@pytest.mark.parametrize(
+    "document", ["README.md", "docs/avoidance.md", "docs/performer.md", "docs/reactions.md"]
+)
 def test_the_documents_python_runs(document: str, tmp_path: Path):
     if document == "docs/reactions.md":
         pytest.importorskip("mujoco")
