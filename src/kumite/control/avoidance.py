@@ -7,18 +7,19 @@ need be, its speed adjusted as little as can be.
 
 from __future__ import annotations
 
+import copy
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from kumite.body import Spheres, lay_spheres
 from kumite.clip import SIDES, ClipSet
 from kumite.control.attack import Attack, packed
-from kumite.errors import KumiteError
+from kumite.errors import KumiteError, unknown
 from kumite.graph import Library
 from kumite.kernels import avoid as kernels
 from kumite.kernels import cells, paths
@@ -28,6 +29,7 @@ NONE = -1
 END_EFFECTORS = tuple(f"{side}_{part}" for part in ("hand", "foot") for side in SIDES)
 GROUP = 8  # spheres that are looked at together, or not at all
 MOST_OTHERS = 32  # next best paths that are told
+TUNABLE = ("window", "weights", "enough", "far", "most", "clearance", "wide", "ahead")
 MOST_PATHS = 50_000  # candidates of one search; what comes after them is not weighed
 
 
@@ -198,7 +200,11 @@ class AvoidanceSearch:
             soonest,
             float(clips.fps),
         )
-        self.weighing = kernels.Weighing(
+        self.weighing = self._weighing(s)
+        self._local = threading.local()
+
+    def _weighing(self, s: AvoidanceRules) -> kernels.Weighing:
+        return kernels.Weighing(
             np.array(s.weights),
             s.enough,
             s.far,
@@ -208,7 +214,20 @@ class AvoidanceSearch:
             s.ramp,
             float(self.spheres.radius.max()),
         )
-        self._local = threading.local()
+
+    def tuned(self, **rules: Any) -> AvoidanceSearch:
+        """The same with other rules of those that :data:`TUNABLE` names; they share all arrays.
+        Searches of this one that are under way end as they began.
+
+        Errors: rules that the index, the masks or the graph were made by; values not allowed.
+        """
+        for name in rules:
+            if name not in TUNABLE:
+                raise unknown("rule that can be tuned", name, TUNABLE)
+        other = copy.copy(self)
+        other.settings = replace(self.settings, **rules)
+        other.weighing = self._weighing(other.settings)
+        return other
 
     @cached_property
     def masks(self) -> kernels.Masks:
