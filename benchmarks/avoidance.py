@@ -37,7 +37,7 @@ from kumite.scene.dodge import AIM_SPREAD, DodgersSettings, DodgeScene, DodgeSet
 
 SEED = 20110
 THROWS, FEW_THROWS = 1000, 60
-BLIND = 240  # throws at who does not look
+BLIND = 120  # throws at who does not look
 RUNS = 4  # scenes, each with a seed of its own, that the throws are spread over
 EVERY = 1.8  # s between throws: the last has landed
 PAPER = {  # Table 1, ms: (index, culling)
@@ -508,10 +508,11 @@ def _throws(throws: int) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--only", nargs="+", choices=list(_SECTIONS), default=list(_SECTIONS))
+    parser.add_argument("--throws", type=int, default=THROWS, help="at each graph")
     parser.add_argument("--quick", action="store_true", help="few throws")
     parser.add_argument("-o", "--output", type=Path, help="a document with marks")
     given = parser.parse_args()
-    throws = FEW_THROWS if given.quick else THROWS
+    throws = FEW_THROWS if given.quick else given.throws
     for name in given.only:
         begin = time.perf_counter()
         text = _SECTIONS[name](throws) + _throws(throws) * (name not in ("time", "barrage"))
