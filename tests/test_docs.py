@@ -34,7 +34,14 @@ def test_examples_run(example: str, tmp_path: Path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "document", ["README.md", "docs/performer.md", "docs/reactions.md", "docs/preparation.md"]
+    "document",
+    [
+        "README.md",
+        "docs/avoidance.md",
+        "docs/performer.md",
+        "docs/preparation.md",
+        "docs/reactions.md",
+    ],
 )
 def test_the_documents_python_runs(document: str, tmp_path: Path):
     if document == "docs/reactions.md":

@@ -167,14 +167,6 @@ def test_avoiding_helps():
     assert seen[False] < seen[True]
 
 
-def test_who_goes_home_does_not_go_astray():
-    made = scene(3, 1)
-    for _ in range(900):
-        made.step()
-    assert np.all(np.isfinite(made.root_position))
-    assert np.linalg.norm(made.root_position[0, [0, 2]]) < 4.0
-
-
 # Searches in the background ----------------------------------------------------------------------
 
 
@@ -198,7 +190,7 @@ def found_by(made: DodgeScene, paths: list[tuple[int, ...]]) -> Avoidance:
 def test_stale_candidates_are_dropped(fits: bool, monkeypatch):
     """Another edge has begun meanwhile: the best path with that edge is taken, or none."""
     table, timed = few().table, []
-    made = scene(1, 1, latency=30)
+    made = scene(1, 1, latency=75)
     made.step()
     mind = made.dodgers.minds[0]
     state = int(table.target[mind.stretch])
@@ -216,9 +208,9 @@ def test_stale_candidates_are_dropped(fits: bool, monkeypatch):
 
     monkeypatch.setattr(AvoidanceSearch, "search", searched)
     monkeypatch.setattr(AvoidanceSearch, "timed", plan)
-    made.throw(np.array([0.0, 1.2, 7.0]), np.array([0.0, 1.2, 0.0]), 4.0)
+    made.throw(np.array([0.0, 1.2, 7.0]), np.array([0.0, 1.2, 0.0]), 2.0)
     edges = mind.edges
-    for _ in range(60):
+    for _ in range(100):
         made.step()
         if timed or any(e.kind == "stale" for e in made.events):
             break
