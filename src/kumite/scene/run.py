@@ -78,6 +78,7 @@ def record(
             "object_yaw": {o.name: o.yaw for o in scene.objects if o.size is not None},
             "object_line": [o.name for o in scene.objects if o.line],
             "aims_at": scene.settings.aims,
+            **({"unarmed": list(unarmed)} if (unarmed := getattr(scene, "unarmed", ())) else {}),
             "scene": scene.settings.model_dump(mode="json"),
         },
     )
