@@ -15,11 +15,14 @@ from kumite.clip import LIMBS, tip_positions
 from kumite.control.avoidance import NONE, AvoidanceSearch, Standing, _now
 from kumite.kernels import counter as kernels
 from kumite.kernels import paths
+from kumite.rotation import planar_compose
 
 WITHIN = 1.2  # s from now at the latest that a blow lands
 DEEP = 0.02  # m that a fist should reach into what it meets
 NEARLY = 0.03  # m by which it may miss: whoever is hit moves
 HASTE = 0.15  # m of depth that a second of waiting is worth
+ROOM = 0.55  # m between two pelvises that a path must leave where it ends
+TRIED = 16  # of the best paths that are looked at for room
 
 
 @dataclass(frozen=True)
@@ -74,12 +77,19 @@ class CounterSearch:
         self._after = _goes_on(table.first, table.last)
 
     def find(
-        self, standing: Standing, goal: np.ndarray, radius: np.ndarray, *, within: float = WITHIN
+        self,
+        standing: Standing,
+        goal: np.ndarray,
+        radius: np.ndarray,
+        body: np.ndarray,
+        *,
+        within: float = WITHIN,
     ) -> Counter | None:
         """A blow that meets one of M goals, if there is one.
 
-        goal [T, M, 3] m: where they will be at the next frames, the last row from then on;
-        radius [M] m. Of blows that reach, one that does so soon and well.
+        goal [T, M, 3] m: where they will be at frames 0.. from now, the last row from then on;
+        radius [M] m; body [T, 3]: the pelvis between them, which is not walked into. Of blows that
+        reach within so many s, one that does so soon and well.
         """
         search = self.search
         state = search.state_at(standing.stop)
@@ -102,13 +112,24 @@ class CounterSearch:
         if len(reaches) == 0:
             return None
         cost = np.maximum(gap[reaches], -DEEP) + HASTE * when[reaches] / fps
-        best = int(reaches[np.argmin(cost)])
-        path = room.path[best, : room.length[best]].tolist()
-        following = self._after[path[-1]]  # what the blow's own capture does next: it ends there
-        if following != NONE:
-            path.append(int(following))
-        blow = int(self.which[room.part[best]])
-        return Counter(tuple(path), blow, float(gap[best]), float(when[best]) / fps)
+        for best in reaches[np.argsort(cost, kind="stable")[:TRIED]].tolist():
+            path = room.path[best, : room.length[best]].tolist()
+            following = self._after[path[-1]]  # what the blow's own capture does next: it ends there
+            if following != NONE:
+                path.append(int(following))
+            end = self._end(standing, path)
+            if np.hypot(*(body[-1, [0, 2]] - end)) >= ROOM:
+                blow = int(self.which[room.part[best]])
+                return Counter(tuple(path), blow, float(gap[best]), float(when[best]) / fps)
+        return None
+
+    def _end(self, standing: Standing, path: list[int]) -> np.ndarray:
+        """Where [2] a path ends, over the ground."""
+        library = self.search.library
+        here = planar_compose(standing.anchor, library.clips.facing[standing.stop])
+        for stretch in path:
+            here = planar_compose(here, library.table.displacement[stretch])
+        return here[:2]
 
 
 def _goes_on(first: np.ndarray, last: np.ndarray) -> np.ndarray:

@@ -50,8 +50,8 @@ One = tuple[Body, Cast, int, np.ndarray]
 """A body, the cast that plays it, its number there, and the parts that must not be in another."""
 
 
-def push_two(one: One, other: One, fps: float) -> None:
-    """Carry two who are deeper than :data:`ALLOWED` in each other a bit apart."""
+def push_two(one: One, other: One, fps: float, speed: float = PUSH_SPEED) -> None:
+    """Carry two who are deeper than :data:`ALLOWED` in each other a bit apart, at most so fast."""
     (a, cast_a, k, parts), (b, cast_b, o, other_parts) = one, other
     if np.hypot(*(cast_a.root_position[k] - cast_b.root_position[o])[[0, 2]]) > REACH:
         return
@@ -68,6 +68,6 @@ def push_two(one: One, other: One, fps: float) -> None:
     if found.depth <= ALLOWED:
         return
     length = float(np.hypot(*found.displacement))
-    way = min(found.depth - ALLOWED, PUSH_SPEED / fps) * found.displacement / length
+    way = min(found.depth - ALLOWED, speed / fps) * found.displacement / length
     cast_a.carry(k, 0.5 * way)
     cast_b.carry(o, -0.5 * way)

@@ -26,7 +26,8 @@ TOO_FAR = 0.6  # m from home that is not minded …
 ROAMING = 3.0  # … and by those who keep a distance
 TOO_NEAR = 2.0  # rad for each metre nearer than the distance to keep …
 TOO_WIDE = 1.0  # … and for each metre farther
-IN_VAIN = 1.0  # rad, of a blow at nobody
+IN_VAIN = 1.5  # rad, of a blow at nobody …
+SOON = 0.6  # s after which at the latest it would come
 
 _POOL: list[ThreadPoolExecutor] = []
 
@@ -88,8 +89,8 @@ class Dodgers:
         part_of = search.graph.part_of
         self._avoids = part_of[1:] > part_of[:-1]
         peaks = np.sort(self.library.strikes.frame)
-        inside = np.searchsorted(peaks, table.last, "right") - np.searchsorted(peaks, table.first)
-        self._strikes = inside > 0
+        soon = np.maximum(table.first + round(SOON * self.fps), table.last)
+        self._strikes = np.searchsorted(peaks, soon, "right") > np.searchsorted(peaks, table.first)
         calm = np.flatnonzero(~self._avoids)
         ways = np.diff(table.action_start)[table.target]
         restful = calm[ways[calm] >= np.median(ways[calm])] if len(calm) else np.arange(len(ways))

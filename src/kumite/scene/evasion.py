@@ -35,8 +35,12 @@ from kumite.synthesis import Cast
 
 ANTICIPATION = 0.4  # s of a dodger's motion that an attacker foresees; then it takes it to stand
 NEAR = 2.0  # m from a dodger within which a blow that is meant for another menaces it, too
-BOLDNESS = 0.8  # s after an avoided blow in which there is time to strike back
+BOLDNESS = 1.0  # s after an avoided blow in which there is time to strike back
+SAFE = 0.15  # s between a blow back and the next blow that is known to come
 GOALS = ("head", "chest")  # what blows back are meant for
+TRUNK = ("head", "chest", "pelvis")  # what of an attacker an avoidance must not run into …
+THIN = 0.12  # m, of the spheres there: arms may touch
+PUSH = 1.2  # m/s at most with which two who are in each other are carried apart
 
 
 @dataclass
@@ -212,6 +216,18 @@ class EvasionScene:
         self._event("decision", k, stretch=stretch, worth=round(worth, 6))
         for blow in attackers.foresee(a, self.frame):
             self._menace(blow, at)
+        if self.dodge.searches:
+            self._stand_in_the_way(a)
+
+    def _stand_in_the_way(self, a: int) -> None:
+        """An attacker's body is something to keep clear of while avoiding, as far as it is known."""
+        body = self._sides[1].body
+        rows = [body.part(part) for part in TRUNK]
+        centre = self.attackers.parts_ahead(a, body, rows)
+        when = (self.frame + np.arange(len(centre))) / self.fps
+        attack = Attack(when, centre, np.full(len(rows), THIN), f"body of {a}")
+        for d in range(self._dodgers_count):
+            self.dodgers.menace(d, attack, -1 - a).settled = True  # nobody gets out of its way
 
     def _menace(self, blow: Blow, at: int) -> None:
         """A blow has been foreseen, or more of it."""
@@ -241,11 +257,15 @@ class EvasionScene:
         if self._counters is None or self.frame / self.fps > self._bold[d]:
             return ()
         foe, body = self._foe(d), self._sides[1].body
-        rows = [body.part(part) for part in GOALS]
+        rows = [body.part(part) for part in (*GOALS, "pelvis")]
         goal = self.attackers.parts_ahead(foe, body, rows)
         radius = 0.5 * (body.radius_start + body.radius_end)[rows]
-        found = self._counters.find(self.dodgers.standing(d), goal, radius)
-        if found is None:
+        found = self._counters.find(
+            self.dodgers.standing(d), goal[:, :-1], radius[:-1], goal[:, -1]
+        )
+        now = self.frame / self.fps
+        following = min((c.blow.attack.when[0] for c in self._coming.values()), default=np.inf)
+        if found is None or following < now + found.seconds + SAFE:
             return ()
         self._bold[d] = -np.inf
         limb = LIMBS[int(self.library.strikes.limb[found.blow])]
@@ -265,6 +285,7 @@ class EvasionScene:
                     (mine.body, mine.cast, d, held_apart(mine.body, mine.thrown[d])),
                     (its.body, its.cast, a, held_apart(its.body, its.thrown[a])),
                     self.fps,
+                    PUSH,
                 )
 
     def _tell_strike(self, side: int, k: int, s: int, blow: int) -> None:
