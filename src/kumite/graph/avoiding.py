@@ -26,6 +26,7 @@ EVERY = 0.20  # s between the frames from which an avoidance may be begun
 LEAD = 0.40  # s before a part in which it is entered
 CHANGE_EVERY = 1.2  # s between the frames from which another capture may be gone on with
 OFFERED = 16  # avoidances at such a frame, at most: as many as the paper's library has
+SOONER = 0.1  # s that a second, later way into the same avoidance must gain
 ELSEWHERE = 2  # other ways at a frame of change
 WORST = 1.0  # rad: poses farther apart are not joined …
 FEWEST = 2  # … but every frame keeps its best so many ways into an avoidance
@@ -106,7 +107,11 @@ def find_avoiding_transitions(
         for start, stop in zip(strikes.start.tolist(), strikes.stop.tolist()):
             may_leave[max(start - round(WIND_UP[1] * fps), 0) : stop] = False
     leaving = np.flatnonzero(may_leave & ((since % step == 0) | ends | _lasts(parts, len(clips))))
-    changing = np.flatnonzero(may_leave & ((since % change == 0) | ends))
+    # Where the capture goes on into an avoidance there must be another way, too.
+    into = np.zeros(len(clips), dtype=bool)
+    before = np.searchsorted(leaving, parts.start) - 1
+    into[leaving[before[before >= 0]]] = True
+    changing = np.flatnonzero(may_leave & ((since % change == 0) | ends | into))
     # From i the capture goes on with j where i is like j - 1; a part's own frames go on anyway.
     d = _between(features, leaving, entry - 1)
     own = (entry[None] > leaving[:, None]) & (entry[None] - leaving[:, None] <= step)
@@ -116,11 +121,17 @@ def find_avoiding_transitions(
     best = np.minimum.reduceat(d[:, order], first, axis=1)  # [S, P]
     unlike = _signatures(clips, parts)
     source, target, cost = [], [], []
+    sooner = round(SOONER * fps)
     for row, i in enumerate(leaving):
         for p in _choose(best[row], unlike, offered, worst):
             mine = order[first[p] : first[p + 1] if p + 1 < len(parts) else None]
-            j = mine[np.argmin(d[row, mine])]
-            source.append(i), target.append(entry[j]), cost.append(d[row, j])
+            fits = mine[np.argmin(d[row, mine])]
+            late = mine[(d[row, mine] <= worst) & (entry[mine] >= entry[fits] + sooner)]
+            # Where it fits best, and where it is over soonest.
+            for e in {int(fits), int(late[np.argmax(entry[late])]) if len(late) else int(fits)}:
+                source.append(int(i))
+                target.append(int(entry[e]))
+                cost.append(float(d[row, e]))
     # Other captures: frames to go on from that lie in no part, a second apart from each other.
     onward = np.flatnonzero(may_leave & ~ends & (since % step == 0))
     d = _between(features, changing, onward)
@@ -135,7 +146,9 @@ def find_avoiding_transitions(
             taken = [t for s, t in zip(source[-ELSEWHERE:], target[-ELSEWHERE:]) if s == i]
             if any(abs(t - onward[j]) < fps for t in taken):
                 continue
-            source.append(i), target.append(onward[j] + 1), cost.append(d[row, j])
+            source.append(int(i))
+            target.append(int(onward[j]) + 1)
+            cost.append(float(d[row, j]))
             left -= 1
     if strikes is not None and len(strikes):
         recovers = leaving[_just_after(parts, leaving, round(RECOVERY * fps))]

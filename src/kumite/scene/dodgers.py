@@ -127,12 +127,14 @@ class Dodgers:
             if mind.search is not None and frame >= mind.due:
                 self._take_up(k, mind, now)
             mind.menaces = [m for m in mind.menaces if m.attack.when[-1] >= now]
-            if mind.search is None:
-                self._begin_search(k, mind, frame)
         for k, mind in enumerate(self.minds):
             cast.rate[k] = self._rate(mind, now)
         for k in cast.waiting.tolist():
-            self._go_on(k, self.minds[k])
+            self._go_on(k, self.minds[k], now)
+        for k, mind in enumerate(self.minds):
+            if mind.search is None and self._seen(mind, now):
+                mind.due = frame + self.latency
+                mind.search = _background().submit(self._search, *self._asked(k, mind, now))
         cast.advance()
 
     def _rate(self, mind: Mind, now: float) -> float:
@@ -159,9 +161,11 @@ class Dodgers:
             1.0 / float(cast.rate[k]),
         )
 
-    def _begin_search(self, k: int, mind: Mind, frame: int) -> None:
-        now = frame / self.fps
-        # In the same edge nothing else would be found, and what is early is not so for long.
+    def _seen(self, mind: Mind, now: float) -> Menace | None:
+        """What is to be thought about next: the attack that is over first of those not yet seen to.
+
+        In the same edge the same would be found, so each is thought about once an edge.
+        """
         soon = [
             m
             for m in mind.menaces
@@ -169,19 +173,30 @@ class Dodgers:
             and m.tried < mind.edges
             and m.attack.when[-1] - now < SOONEST
         ]
-        if not soon:
-            return
-        mind.main = min(soon, key=lambda m: m.attack.when[-1])
-        mind.main.tried = mind.edges
-        attacks = [mind.main.attack, *(m.attack for m in mind.menaces if m is not mind.main)]
-        mind.since = []
-        mind.due = frame + self.latency
-        mind.search = _background().submit(self.search.search, self.standing(k), attacks, now)
+        return min(soon, key=lambda m: m.attack.when[-1]) if soon else None
+
+    def _asked(self, k: int, mind: Mind, now: float) -> tuple[Standing, list[Attack], float]:
+        """A search's arguments."""
+        mind.main = main = self._seen(mind, now)
+        assert main is not None
+        main.tried, mind.since = mind.edges, []
+        return (
+            self.standing(k),
+            [main.attack, *(m.attack for m in mind.menaces if m is not main)],
+            now,
+        )
+
+    def _search(self, standing: Standing, attacks: list[Attack], now: float) -> Avoidance:
+        return self.search.search(standing, attacks, now)
 
     def _take_up(self, k: int, mind: Mind, now: float) -> None:
         assert mind.search is not None and mind.main is not None
         found, menace = mind.search.result(), mind.main
         mind.search = mind.main = None
+        self._follow(k, mind, found, menace, now)
+
+    def _follow(self, k: int, mind: Mind, found: Avoidance, menace: Menace, now: float) -> None:
+        """Take up what has been found against an attack."""
         if found.outcome not in menace.told or found.outcome == Outcome.FOUND:
             menace.told.add(found.outcome)
             self.tell("avoidance", k, **_told(found, menace))
@@ -207,9 +222,18 @@ class Dodgers:
 
     # Going on ------------------------------------------------------------------------------------
 
-    def _go_on(self, k: int, mind: Mind) -> None:
-        """Character k begins another edge: its plan's, or one that suits."""
+    def _go_on(self, k: int, mind: Mind, now: float) -> None:
+        """Character k begins another edge: its plan's, or one that suits.
+
+        Whoever stands at a fork when an attack is first seen decides there and then.
+        """
         table = self.library.table
+        planned = mind.plan is not None and mind.next_edge < len(mind.plan.path)
+        if not planned and mind.search is None and self._seen(mind, now):
+            asked = self._asked(k, mind, now)
+            main, mind.main = mind.main, None
+            assert main is not None
+            self._follow(k, mind, self._search(*asked), main, now)
         if mind.plan is not None and mind.next_edge < len(mind.plan.path):
             stretch = mind.plan.path[mind.next_edge]
             mind.next_edge += 1

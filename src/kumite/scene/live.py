@@ -247,7 +247,7 @@ class LiveScene:
             self._things[o, :3] = thing.position
         cast, floor = self.cast, self.floor
         who = cast.waiting
-        states = np.searchsorted(self.library.table.state_frame, cast.reached[who])
+        states = np.searchsorted(self.library.table.state_frame, cast.stop[who])
         self.fighters.note(who)
         run = kernels.step_many if cast.count >= MANY else kernels.step
         happened = run(
