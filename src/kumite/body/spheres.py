@@ -113,9 +113,7 @@ def limb_spheres(
     rows = [body.part(f"{side}_{part}") for part in _CARRIED[end]]
     names = ("joint", "start", "end", "radius_start", "radius_end", "mass")
     arrays = [getattr(body, name)[rows] for name in names]
-    return lay_spheres(
-        skeleton, Body(tuple(body.parts[r] for r in rows), *arrays), thicker=thicker
-    )
+    return lay_spheres(skeleton, Body(tuple(body.parts[r] for r in rows), *arrays), thicker=thicker)
 
 
 def strikes_with(skeleton: Skeleton, limb: str) -> str:

@@ -114,7 +114,9 @@ class CounterSearch:
         cost = np.maximum(gap[reaches], -DEEP) + HASTE * when[reaches] / fps
         for best in reaches[np.argsort(cost, kind="stable")[:TRIED]].tolist():
             path = room.path[best, : room.length[best]].tolist()
-            following = self._after[path[-1]]  # what the blow's own capture does next: it ends there
+            following = self._after[
+                path[-1]
+            ]  # what the blow's own capture does next: it ends there
             if following != NONE:
                 path.append(int(following))
             end = self._end(standing, path)

@@ -32,7 +32,8 @@ WORST = 1.0  # rad: poses farther apart are not joined …
 FEWEST = 2  # … but every frame keeps its best so many ways into an avoidance
 UNLIKE = 0.10  # m, root mean square: avoidances nearer to each other than that are alike
 RECOVERY = 0.10  # s after an avoidance in which blows are offered, too
-WIND_UP = (0.12, 0.36)  # s before a blow's drive in which it is entered
+WIND_UP = (0.12, 0.36)  # s before a blow's drive in which it is entered …
+COMMITTED = 0.36  # … and from which on it is gone through with
 BLOWS = 6  # offered at such a frame, at most
 SAME_PLACE = 0.10  # m: blows that land nearer to each other than that are alike
 ROLES = ("head", "chest", "pelvis", "left_hand", "right_hand", "left_foot", "right_foot")
@@ -105,7 +106,7 @@ def find_avoiding_transitions(
     may_leave = ~begun & (since > 0)
     if strikes is not None:  # and whoever has begun to strike
         for start, stop in zip(strikes.start.tolist(), strikes.stop.tolist()):
-            may_leave[max(start - round(WIND_UP[1] * fps), 0) : stop] = False
+            may_leave[max(start - round(COMMITTED * fps), 0) : stop] = False
     leaving = np.flatnonzero(may_leave & ((since % step == 0) | ends | _lasts(parts, len(clips))))
     # Where the capture goes on into an avoidance there must be another way, too.
     into = np.zeros(len(clips), dtype=bool)
@@ -214,14 +215,20 @@ def _strike_back(
     usable = strikes.start - late > clips.clip_start[clips.clip_of_frame[strikes.start]]
     entry = strikes.start[usable, None] - lead  # [X, E]
     inside = begun[entry].any(axis=1)
-    frame, limb, entry = strikes.frame[usable][~inside], strikes.limb[usable][~inside], entry[~inside]
+    frame, limb, entry = (
+        strikes.frame[usable][~inside],
+        strikes.limb[usable][~inside],
+        entry[~inside],
+    )
     if len(entry) == 0 or len(leaving) == 0:
         return []
     to_entry = planar_compose(planar_inverse(clips.facing[entry[:, 0]]), clips.facing[frame])
     lands = planar_apply(to_entry, strikes.tip[frame, limb])
     d = _between(features, leaving, entry.ravel() - 1).reshape(len(leaving), *entry.shape)
     own = np.abs(entry[None] - leaving[:, None, None]) < clips.fps
-    d[own & (clips.clip_of_frame[leaving][:, None, None] == clips.clip_of_frame[entry][None])] = np.inf
+    d[own & (clips.clip_of_frame[leaving][:, None, None] == clips.clip_of_frame[entry][None])] = (
+        np.inf
+    )
     out = []
     for row, i in enumerate(leaving.tolist()):
         chosen: list[int] = []

@@ -73,7 +73,9 @@ def skill_of(
     tracks = stretch_tracks(library) if len(library.strikes) else None
     if tracks is None or len(tracks.tip) == 0:
         raise KumiteError("the attackers' library holds no blows in its graph: nobody can strike")
-    policies = [trained(library, b, cache, progress=progress) for b in (approach(), strike(library))]
+    policies = [
+        trained(library, b, cache, progress=progress) for b in (approach(), strike(library))
+    ]
     return Skill(library, policies[0], policies[1], tracks)
 
 
@@ -99,9 +101,7 @@ class Attackers:
         self.next = np.full(len(settings), -1)  # [A] the stretch that each takes next, -1: any
         self._known: dict[tuple[int, int, int], int] = {}  # blows told of -> frames of them
 
-    def decide(
-        self, k: int, target: np.ndarray, bodies: np.ndarray
-    ) -> tuple[int, float]:
+    def decide(self, k: int, target: np.ndarray, bodies: np.ndarray) -> tuple[int, float]:
         """What character k does after its present action: the stretch and its worth.
 
         target [H, 4]: where what it aims at is expected then, and the way that faces; bodies
@@ -155,6 +155,10 @@ class Attackers:
             out.append(Blow(k, limb, blow, attack))
         return out
 
+    def known(self, k: int) -> float:
+        """For how long [s] from now it is known what character k does."""
+        left = int(self.cast.stop[k]) - int(self.cast.frame[k])
+        return (left + int(self.library.table.duration[self.next[k]])) / self.fps
 
     def parts_ahead(self, k: int, body: Body, rows: Sequence[int]) -> np.ndarray:
         """Where the middles of parts of character k's body will be [T, M, 3] m: now, and at the

@@ -8,7 +8,7 @@ seen nor felt.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -34,9 +34,10 @@ from kumite.scene.stage import SceneObject
 from kumite.synthesis import Cast
 
 ANTICIPATION = 0.4  # s of a dodger's motion that an attacker foresees; then it takes it to stand
+HORIZON = 0.6  # s to which the index looks ahead: of blows, most are over before it would pay
 NEAR = 2.0  # m from a dodger within which a blow that is meant for another menaces it, too
 BOLDNESS = 1.0  # s after an avoided blow in which there is time to strike back
-SAFE = 0.15  # s between a blow back and the next blow that is known to come
+SAFE = 0.25  # s between a blow back and the next blow that may come
 GOALS = ("head", "chest")  # what blows back are meant for
 TRUNK = ("head", "chest", "pelvis")  # what of an attacker an avoidance must not run into …
 THIN = 0.12  # m, of the spheres there: arms may touch
@@ -123,7 +124,7 @@ class EvasionScene:
             for name in side
         )
         self.dodge = settings.dodge or DodgeSettings()
-        self.search = AvoidanceSearch(library, self.dodge.search())
+        self.search = AvoidanceSearch(library, replace(self.dodge.search(), horizon=HORIZON))
         _ = self.search.masks, self.search.index  # made now, not at the first blow
         self.skill = skill_of(attack, cache, progress)
         self._counters = CounterSearch(self.search) if self.dodge.counters else None
@@ -150,9 +151,7 @@ class EvasionScene:
 
     @property
     def root_position(self) -> np.ndarray:
-        return np.concatenate(
-            [self.dodgers.cast.root_position, self.attackers.cast.root_position]
-        )
+        return np.concatenate([self.dodgers.cast.root_position, self.attackers.cast.root_position])
 
     @property
     def wxyz(self) -> np.ndarray:
@@ -220,7 +219,7 @@ class EvasionScene:
             self._stand_in_the_way(a)
 
     def _stand_in_the_way(self, a: int) -> None:
-        """An attacker's body is something to keep clear of while avoiding, as far as it is known."""
+        """An attacker's body, as far as it is known, is to be kept clear of while avoiding."""
         body = self._sides[1].body
         rows = [body.part(part) for part in TRUNK]
         centre = self.attackers.parts_ahead(a, body, rows)
@@ -264,7 +263,10 @@ class EvasionScene:
             self.dodgers.standing(d), goal[:, :-1], radius[:-1], goal[:, -1]
         )
         now = self.frame / self.fps
-        following = min((c.blow.attack.when[0] for c in self._coming.values()), default=np.inf)
+        following = min(
+            [float(c.blow.attack.when[0]) for c in self._coming.values()],
+            default=now + self.attackers.known(foe),
+        )
         if found is None or following < now + found.seconds + SAFE:
             return ()
         self._bold[d] = -np.inf

@@ -17,7 +17,7 @@ from kumite import toml
 from kumite.errors import KumiteError
 from kumite.scene.attackers import AttackerSettings
 from kumite.scene.balls import BallsSettings
-from kumite.scene.dodge import DodgerSettings, DodgeSettings, DodgersSettings
+from kumite.scene.dodge import DodgerSettings, DodgersSettings, DodgeSettings
 from kumite.scene.fighters import (
     ARENA,
     FARTHEST,
