@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from kumite import performer, toml
+from kumite import toml
 from kumite.body import body_mesh, limb_spheres, strikes_with
 from kumite.clip import LIMBS, forward_kinematics, tip_positions
 from kumite.control.attack import Attack, from_limbs
-from kumite.control.avoidance import AvoidanceSearch
+from kumite.control.avoidance import AvoidanceSearch, Standing
 from kumite.control.counter import CounterSearch
 from kumite.errors import KumiteError
 from kumite.graph import Library, builtin_library
@@ -160,18 +158,14 @@ def test_counters_meet_what_they_are_meant_for(fighting: AvoidanceSearch):
     strikes = library.strikes
     # Somebody who stands where a blow of the library lands, seen from a way into it, is met.
     x = int(search.which[len(search.which) // 2])
-    tip = tip_positions(
-        library.clips.skeleton, LIMBS[int(strikes.limb[x])], *library.clips.world
-    )[strikes.frame[x]]
+    tip = tip_positions(library.clips.skeleton, LIMBS[int(strikes.limb[x])], *library.clips.world)[
+        strikes.frame[x]
+    ]
     table = library.table
     before = int(
-        np.flatnonzero(
-            (table.first <= strikes.frame[x]) & (table.last >= strikes.frame[x])
-        )[0]
+        np.flatnonzero((table.first <= strikes.frame[x]) & (table.last >= strikes.frame[x]))[0]
     )
     state_frame = int(table.first[before]) - 1
-    from kumite.control.avoidance import Standing
-
     standing = Standing(np.zeros(3), float(state_frame), state_frame)
     if fighting.state_at(state_frame) < 0:
         pytest.skip("the blow's stretch is entered by a jump only")
@@ -181,7 +175,6 @@ def test_counters_meet_what_they_are_meant_for(fighting: AvoidanceSearch):
     assert found is not None
     assert found.gap < 0.03
     assert search.find(standing, goal + 30.0, np.array([0.05]), far) is None
-    assert search.find(standing, goal, np.array([0.05]), goal[:, 0]) is None or True
 
 
 @pytest.fixture(scope="module")
@@ -213,14 +206,12 @@ def test_bad_scene_files_say_what_is_wrong(text, wrong):
         toml.parse('title = "t"\n' + text, "t.toml", SceneSettings)
 
 
-def test_libraries_of_different_bodies_are_refused(avoiding, swordsman):
-    other = performer.skeleton()
-    assert not other.same_as(swordsman.clips.skeleton)
-    with pytest.raises(KumiteError, match="nobody can strike|blows|who avoids"):
+def test_a_scene_without_attackers_is_refused(avoiding, swordsman):
+    with pytest.raises(KumiteError, match="who attacks"):
         EvasionScene(builtin_scenes()["dodgeball"], avoiding, swordsman)
 
 
-def test_slip_and_blades_come_with_kumite(tmp_path: Path):
+def test_slip_and_blades_come_with_kumite():
     scenes = builtin_scenes()
     assert scenes["slip"].names == ("blue", "red")
     assert scenes["blades"].aims == {"runaway": "swordsman", "swordsman": "runaway"}

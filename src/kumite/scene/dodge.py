@@ -65,7 +65,7 @@ class DodgeSettings(Settings):
     index: bool = True
     culling: bool = True
     searches: bool = True  # False: they only stand about
-    counters: bool = True  # strikes back where a blow has been avoided, if the library has blows
+    counters: bool = True  # where a blow has been avoided, they strike back, if they have blows
     distance: Annotated[Finite, Field(ge=0.5, le=10)] = 1.0  # m kept to whoever attacks
 
     def search(self) -> AvoidanceRules:

@@ -182,10 +182,12 @@ class EvasionScene:
         self._keep_apart()
         self.frame += 1
         for side, begun in enumerate([s.step() for s in self._sides]):
-            for k, s, blow in begun:
-                self._tell_strike(side, k, s, blow)
+            if self._strikes(side):
+                for k, s, blow in begun:
+                    self._tell_strike(side, k, s, blow)
         for side in (0, 1):
-            self._land(side)
+            if self._strikes(side):
+                self._land(side)
         self._end_blows()
         return True
 
@@ -289,6 +291,10 @@ class EvasionScene:
                     self.fps,
                     PUSH,
                 )
+
+    def _strikes(self, side: int) -> bool:
+        """Whether one side's blows count: arms of those who only avoid swing as if they struck."""
+        return side == 1 or self._counters is not None
 
     def _tell_strike(self, side: int, k: int, s: int, blow: int) -> None:
         told = {}
