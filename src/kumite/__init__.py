@@ -14,11 +14,12 @@ if TYPE_CHECKING:
     from kumite import mocap, performer
     from kumite.annotate import find_contacts, find_strikes
     from kumite.clip import Clip, ClipSet, Skeleton, concatenate, mirror, resample
-    from kumite.control import approach, solve, strike
+    from kumite.control import AvoidanceSearch, approach, solve, strike
     from kumite.errors import KumiteError
     from kumite.graph import (
         Library,
         build_action_library,
+        build_avoidance_library,
         build_library,
         builtin_library,
         load_library,
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     )
     from kumite.scene import (
         BoutScene,
+        DodgeScene,
         LiveScene,
         Playback,
         Recording,
@@ -43,11 +45,12 @@ __version__ = "0.1.0"
 _WHERE = {
     "annotate": ("find_contacts", "find_strikes"),
     "clip": ("Clip", "ClipSet", "Skeleton", "concatenate", "mirror", "resample"),
-    "control": ("approach", "solve", "strike"),
+    "control": ("AvoidanceSearch", "approach", "solve", "strike"),
     "errors": ("KumiteError",),
     "graph": (
         "Library",
         "build_action_library",
+        "build_avoidance_library",
         "build_library",
         "builtin_library",
         "load_library",
@@ -55,6 +58,7 @@ _WHERE = {
     ),
     "scene": (
         "BoutScene",
+        "DodgeScene",
         "LiveScene",
         "Playback",
         "Recording",
@@ -82,9 +86,11 @@ def __dir__() -> list[str]:
 
 
 __all__ = [
+    "AvoidanceSearch",
     "BoutScene",
     "Clip",
     "ClipSet",
+    "DodgeScene",
     "KumiteError",
     "Library",
     "LiveScene",
@@ -93,6 +99,7 @@ __all__ = [
     "Skeleton",
     "approach",
     "build_action_library",
+    "build_avoidance_library",
     "build_library",
     "builtin_library",
     "builtin_scenes",

@@ -19,8 +19,11 @@ from kumite.annotate.avoidance import (
     find_avoidance,
     no_avoidance,
 )
+from kumite.annotate.balance import Balance, centre_of_mass, find_balance
 from kumite.annotate.contacts import Contacts, find_contacts
+from kumite.annotate.cycles import Cycles, CycleSettings, find_cycles, hand_cycles, labelled_frames
 from kumite.annotate.likeness import Likeness, measure_likeness
+from kumite.annotate.reference import Reference, find_mark, find_reference
 from kumite.annotate.strikes import Strikes, find_strikes, only_blows
 
 __all__ = [
@@ -32,13 +35,24 @@ __all__ = [
     "Actions",
     "AvoidanceParts",
     "AvoidanceSettings",
+    "Balance",
     "Contacts",
+    "CycleSettings",
+    "Cycles",
     "Likeness",
+    "Reference",
     "Strikes",
+    "centre_of_mass",
     "find_actions",
     "find_avoidance",
+    "find_balance",
     "find_contacts",
+    "find_cycles",
+    "find_mark",
+    "find_reference",
     "find_strikes",
+    "hand_cycles",
+    "labelled_frames",
     "measure_likeness",
     "no_avoidance",
     "only_blows",

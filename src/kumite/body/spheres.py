@@ -1,4 +1,4 @@
-"""Spheres laid on the skeleton so that they cover the body: its volume (Oshita & Masaoka 2011, 4.2).
+"""Spheres laid on the skeleton so that they cover the body, its volume (Oshita & Masaoka 2011).
 
 The paper lays them by hand; here they follow from the capsules of the body, and a file of them can
 be edited. A chain of spheres covers a capsule if each is a little thicker than the capsule: how
@@ -7,6 +7,7 @@ much decides how many there are.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -150,15 +151,17 @@ class _File(BaseModel):
 
 def save_spheres(path: Path | str, spheres: Spheres, skeleton: Skeleton) -> None:
     """A TOML file of them, one ``[[sphere]]`` each, that can be edited."""
-    roles = {j: role for role, j in skeleton.roles.items()}
+    names = skeleton.names
+    # A role may be another joint's name.
+    roles = {j: role for role, j in skeleton.roles.items() if role not in names or names[j] == role}
     rows = [
         "# Spheres on the skeleton: joint (role or name), centre in its axes and radius in m.\n"
     ]
     for j, centre, r in zip(spheres.joint.tolist(), spheres.centre.tolist(), spheres.radius):
-        name = roles.get(j, skeleton.names[j])
+        name = json.dumps(roles.get(j, names[j]), ensure_ascii=False)
         x, y, z = centre
         rows.append(
-            f'\n[[sphere]]\njoint = "{name}"\ncentre = [{x:.4f}, {y:.4f}, {z:.4f}]\n'
+            f"\n[[sphere]]\njoint = {name}\ncentre = [{x:.4f}, {y:.4f}, {z:.4f}]\n"
             f"radius = {r:.4f}\n"
         )
     with writing(path) as temporary:
@@ -181,9 +184,9 @@ def load_spheres(path: Path | str, skeleton: Skeleton) -> Spheres:
 
 
 def _joint(path: Path, skeleton: Skeleton, name: str) -> int:
-    if name in skeleton.roles:
-        return int(skeleton.roles[name])
     if name in skeleton.names:
         return skeleton.names.index(name)
+    if name in skeleton.roles:
+        return int(skeleton.roles[name])
     error = unknown("joint", name, [*skeleton.roles, *skeleton.names])
     raise KumiteError(f"{path}: {error}")

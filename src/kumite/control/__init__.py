@@ -1,5 +1,7 @@
 """Controllers: given what a character sees, choose its next action."""
 
+from kumite.control.attack import Attack, thrown
+from kumite.control.avoidance import Avoidance, AvoidanceRules, AvoidanceSearch, Standing
 from kumite.control.combination import (
     HIT_DIRECTIONS,
     POSITIONS,
@@ -26,6 +28,13 @@ from kumite.control.policy import (
     strike,
     take_place,
 )
+from kumite.control.preparation import (
+    Motions,
+    PreparationPolicy,
+    PreparationSettings,
+    gradual,
+    trained_preparation,
+)
 from kumite.control.routes import CheckPoint, Missed, Progress, Reached, Route
 from kumite.control.styles import STYLES, Style, short_range, style
 from kumite.control.trained import cache_folder, trained
@@ -37,18 +46,26 @@ __all__ = [
     "POSITIONS",
     "STYLES",
     "Annotations",
+    "Attack",
+    "Avoidance",
+    "AvoidanceRules",
+    "AvoidanceSearch",
     "Behaviour",
     "CheckPoint",
     "CombinationTable",
     "Entry",
     "Fighters",
     "Missed",
+    "Motions",
     "Pair",
     "Policy",
+    "PreparationPolicy",
+    "PreparationSettings",
     "Progress",
     "Reached",
     "Route",
     "Skill",
+    "Standing",
     "Station",
     "Style",
     "TargetGrid",
@@ -60,6 +77,7 @@ __all__ = [
     "build_table",
     "cache_folder",
     "circle",
+    "gradual",
     "heading_grid",
     "keep_off",
     "measure_worth",
@@ -71,6 +89,8 @@ __all__ = [
     "strike_grid",
     "style",
     "take_place",
+    "thrown",
     "trained",
+    "trained_preparation",
     "write_table",
 ]

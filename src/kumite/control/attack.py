@@ -21,6 +21,7 @@ INTERVAL = 1 / 20  # s between samples at most, the paper's
 LONGEST_STEP = 0.10  # m that an attack goes between two samples at most
 FASTEST = 400.0  # m/s: faster is no attack but a mistake
 SMALLEST, LARGEST = 0.005, 2.0  # m, radii
+LONGEST = 600.0  # s
 NEAR = 2.0  # m from a character's root over the ground: only there an attack counts
 GRAVITY = 9.81  # m/s²
 
@@ -57,7 +58,12 @@ class Attack:
         ):
             if not fits:
                 raise KumiteError(f"attack {self.name!r}: {what}")
-        if self.speed > FASTEST:
+        if self.when[-1] - self.when[0] > LONGEST:
+            raise KumiteError(
+                f"attack {self.name!r}: {self.when[-1] - self.when[0]:g} s; expected at most "
+                f"{LONGEST:g}"
+            )
+        if self.speed > FASTEST * (1.0 + 1e-9):  # rounding
             raise KumiteError(
                 f"attack {self.name!r}: {self.speed:.0f} m/s; expected at most {FASTEST:g}"
             )
@@ -83,19 +89,19 @@ class Attack:
         return self.centre[k] + share * (self.centre[k + 1] - self.centre[k])
 
     @cached_property
-    def dense(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def dense(self) -> tuple[np.ndarray, np.ndarray]:
         """Times [T'] so near to each other that no sphere goes farther than it may between two,
-        what time each stands for [T'], centres [T', I, 3].
+        centres [T', I, 3].
         """
         if len(self) < 2:
-            return self.when, np.zeros(1), self.centre
+            return self.when, self.centre
         way = np.linalg.norm(np.diff(self.centre, axis=0), axis=2).max(axis=1)
         parts = np.ceil(np.maximum(way / LONGEST_STEP, np.diff(self.when) / INTERVAL) - 1e-9)
         parts = np.maximum(parts, 1).astype(int)
         of = np.repeat(np.arange(len(parts)), parts)
         part = np.arange(len(of)) - np.repeat(np.cumsum(parts) - parts, parts)
         when = np.append(self.when[of] + part / parts[of] * np.diff(self.when)[of], self.when[-1])
-        return when, np.gradient(when), self.at(when)
+        return when, self.at(when)
 
 
 def thrown(
@@ -115,8 +121,10 @@ def thrown(
     p, v = np.array(position, dtype=float), np.array(velocity, dtype=float)
     if p.shape != (3,) or v.shape != (3,) or not (np.isfinite(p).all() and np.isfinite(v).all()):
         raise KumiteError(f"attack {name!r}: expected a finite place and velocity of 3 numbers")
-    if not (np.isfinite(seconds) and seconds > 0 and np.isfinite(gravity) and np.isfinite(when)):
-        raise KumiteError(f"attack {name!r}: expected finite times above 0 and gravity")
+    if not (0 < seconds <= LONGEST and np.isfinite(gravity) and np.isfinite(when)):
+        raise KumiteError(
+            f"attack {name!r}: expected a finite time and gravity, above 0 to {LONGEST:g} s"
+        )
     if not SMALLEST <= radius <= LARGEST:
         raise KumiteError(
             f"attack {name!r}: radius {radius} m; expected from {SMALLEST} to {LARGEST}"
@@ -170,21 +178,25 @@ def packed(
     attacks: Sequence[Attack], now: float, place: np.ndarray, within: float = NEAR
 ) -> tuple[Attacks, list[int]]:
     """Attacks as the kernels take them, and which these are: of each what is still to come, times
-    from ``now`` on, from the first sample that is near a place [x, z] to the last.
+    from ``now`` on (where it is now, first), from the first sample near a place [x, z] to the last.
 
     An attack that comes by twice is one attack. Those that never come by are left out.
     """
     taken, which = [], []
     for m, attack in enumerate(attacks):
-        when, lasts, centre = attack.dense
+        when, centre = attack.dense
         first = int(np.searchsorted(when, now))
+        if 0 < first < len(when) and when[first] > now:  # it is on its way from one to the next
+            first -= 1
+            when, centre = when.copy(), centre.copy()
+            when[first], centre[first] = now, attack.at(now)
         off = centre[first:, :, ::2] - place
         close = np.flatnonzero(
             (np.hypot(off[..., 0], off[..., 1]) < within + attack.radius).any(axis=1)
         )
         if len(close):
             part = slice(first + close[0], first + close[-1] + 1)
-            taken.append((when[part] - now, lasts[part], centre[part], attack.radius))
+            taken.append((when[part] - now, _lasts(when[part]), centre[part], attack.radius))
             which.append(m)
     if len(taken) == 1:
         when, lasts, centre, radius = taken[0]
@@ -200,3 +212,9 @@ def packed(
     lasts = np.concatenate([np.zeros(0), *(t[1] for t in taken)])
     count = np.array([len(t[3]) for t in taken], dtype=np.int64)
     return Attacks(sample, when, lasts, centre, radius, count), which
+
+
+def _lasts(when: np.ndarray) -> np.ndarray:
+    """The time [T] that each sample stands for: half of the way to its neighbours."""
+    half = 0.5 * np.diff(when)
+    return np.append(half, 0.0) + np.append(0.0, half)

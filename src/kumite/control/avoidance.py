@@ -7,18 +7,19 @@ need be, its speed adjusted as little as can be.
 
 from __future__ import annotations
 
+import copy
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from kumite.body import Spheres, lay_spheres
 from kumite.clip import SIDES, ClipSet
 from kumite.control.attack import Attack, packed
-from kumite.errors import KumiteError
+from kumite.errors import KumiteError, unknown
 from kumite.graph import Library
 from kumite.kernels import avoid as kernels
 from kumite.kernels import cells, paths
@@ -28,7 +29,8 @@ NONE = -1
 END_EFFECTORS = tuple(f"{side}_{part}" for part in ("hand", "foot") for side in SIDES)
 GROUP = 8  # spheres that are looked at together, or not at all
 MOST_OTHERS = 32  # next best paths that are told
-MOST_PATHS = 50_000  # candidates of one search; more are counted, not weighed
+TUNABLE = ("window", "weights", "enough", "far", "most", "clearance", "wide", "ahead")
+MOST_PATHS = 50_000  # candidates of one search; what comes after them is not weighed
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ class AvoidanceRules:
     most: float = 4.0  # E_time
     fast: float = 0.3  # m/s, V_fast: faster edges may be slowed down
     slow: float = 0.1  # m/s, V_slow: slower edges may be sped up
-    still: float = 0.0  # m/s, V_still: even slower ones either way
+    still: float = 0.0  # m/s, V_still: those no faster either way
     clearance: float = 0.02  # m between attack and body, the paper's 0
     left: float = 0.05  # m by which a part of the body must have moved to have left its place
     ramp: float = 0.2  # s in which a change of speed comes and goes
@@ -53,10 +55,10 @@ class AvoidanceRules:
     culling: bool = True
 
     def __post_init__(self) -> None:
-        for name in ("window", "enough", "far", "ahead", "horizon"):
+        for name in ("window", "enough", "far", "ahead", "horizon", "ramp"):
             if not 0 < getattr(self, name) < 100:
                 raise KumiteError(f"avoidance: {name} {getattr(self, name)}; expected above 0")
-        for name in ("clearance", "left", "ramp", "wide", "fast", "slow", "still"):
+        for name in ("clearance", "left", "wide", "fast", "slow", "still"):
             if not 0 <= getattr(self, name) < 100:
                 raise KumiteError(f"avoidance: {name} {getattr(self, name)}; expected at least 0")
         if len(self.weights) != 3 or min(self.weights) < 0 or not np.isfinite(self.weights).all():
@@ -123,7 +125,7 @@ class Avoidance:
     indexed: bool = False  # whether the index knew it
     counts: tuple[int, ...] = ()  # candidates by what became of them, as kernels.avoid numbers it
     plan: Plan | None = None
-    others: tuple[tuple[tuple[int, ...], int], ...] = ()  # the next best paths and their parts
+    others: tuple[tuple[tuple[int, ...], int], ...] = ()  # the next best, parts as in plans
 
     @property
     def candidates(self) -> int:
@@ -158,7 +160,7 @@ class AvoidanceSearch:
         *,
         spheres: Spheres | None = None,
     ) -> None:
-        """spheres: the body's volume; by default laid to cover it. Errors: no part to avoid with."""
+        """spheres: the body's volume; by default laid to cover it. Errors: no part to use."""
         self.library, self.settings = library, settings or AvoidanceRules()
         clips = library.clips
         self.spheres = spheres or lay_spheres(clips.skeleton)
@@ -181,7 +183,7 @@ class AvoidanceSearch:
             table.action_start, table.stretch, table.first, table.last, table.target,
             part_of, middle, soonest,
         )  # fmt: skip
-        still = speed < s.still
+        still = speed <= s.still
         self.graph = kernels.Graph(
             table.action_start,
             table.stretch,
@@ -198,7 +200,11 @@ class AvoidanceSearch:
             soonest,
             float(clips.fps),
         )
-        self.weighing = kernels.Weighing(
+        self.weighing = self._weighing(s)
+        self._local = threading.local()
+
+    def _weighing(self, s: AvoidanceRules) -> kernels.Weighing:
+        return kernels.Weighing(
             np.array(s.weights),
             s.enough,
             s.far,
@@ -208,7 +214,20 @@ class AvoidanceSearch:
             s.ramp,
             float(self.spheres.radius.max()),
         )
-        self._local = threading.local()
+
+    def tuned(self, **rules: Any) -> AvoidanceSearch:
+        """The same with other rules of those that :data:`TUNABLE` names; they share all arrays.
+        Searches of this one that are under way end as they began.
+
+        Errors: rules that the index, the masks or the graph were made by; values not allowed.
+        """
+        for name in rules:
+            if name not in TUNABLE:
+                raise unknown("rule that can be tuned", name, TUNABLE)
+        other = copy.copy(self)
+        other.settings = replace(self.settings, **rules)
+        other.weighing = self._weighing(other.settings)
+        return other
 
     @cached_property
     def masks(self) -> kernels.Masks:
@@ -338,7 +357,7 @@ class AvoidanceSearch:
                 np.zeros(4),
                 np.zeros(cells.ACROSS * cells.ACROSS * cells.HIGH, dtype=np.int64),
                 np.zeros(MOST_PATHS, dtype=bool),
-                np.zeros(4096, dtype=np.int64),
+                np.zeros(cells.ACROSS * cells.ACROSS * cells.HIGH, dtype=np.int64),
             )  # fmt: skip
         return self._local.room
 
@@ -397,8 +416,8 @@ def _build_index(search: AvoidanceSearch) -> cells.Index:
         )  # fmt: skip
         if count > MOST_PATHS:
             raise KumiteError(
-                f"avoidance: {count} paths lead to an avoidance within {s.horizon} s of a state; "
-                f"expected at most {MOST_PATHS} (a shorter horizon, or fewer transitions)"
+                f"avoidance: more than {MOST_PATHS} paths lead to an avoidance within "
+                f"{s.horizon} s of a state; expected fewer (a shorter horizon, fewer transitions)"
             )
         now = kernels.Now(
             planar_inverse(search.library.clips.facing[frame]), float(frame), frame, NONE, 1.0

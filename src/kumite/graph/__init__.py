@@ -3,6 +3,13 @@
 from kumite.graph.avoiding import build_avoidance_library, find_avoiding_transitions
 from kumite.graph.builtin import builtin_library
 from kumite.graph.distance import PoseFeatures, pose_features
+from kumite.graph.hierarchy import (
+    Hierarchy,
+    Targets,
+    authored_targets,
+    build_hierarchy,
+    hierarchy_table,
+)
 from kumite.graph.library import Library, build_library, load_library, save_library
 from kumite.graph.table import ActionTable, fold
 from kumite.graph.transitions import Transitions, find_transitions, strongest_component
@@ -10,16 +17,21 @@ from kumite.graph.whole import build_action_library
 
 __all__ = [
     "ActionTable",
+    "Hierarchy",
     "Library",
     "PoseFeatures",
+    "Targets",
     "Transitions",
+    "authored_targets",
     "build_action_library",
     "build_avoidance_library",
+    "build_hierarchy",
     "build_library",
     "builtin_library",
     "find_avoiding_transitions",
     "find_transitions",
     "fold",
+    "hierarchy_table",
     "load_library",
     "pose_features",
     "save_library",

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kumite.kernels.jit import lean_kernel
-from kumite.kernels.warp import fill, phase_times, solve
+from kumite.kernels.warp import carried, fill, phase_times, solve
 
 DEPTH = 32  # edges of a path at most
 MOST_FRAMES = 1024  # library frames of a path at most
@@ -170,19 +170,21 @@ def middle(path, count, part, now, graph):
 
 
 @lean_kernel
-def time_scale(path, count, part, aim, now, graph, scratch):
+def time_scale(path, count, part, aim, now, graph, weighing, scratch):
     """The time scale s of a path so that its avoidance falls on ``aim`` [s] (Eqs. 2 and 3).
 
     Returns (s, outcome): s = 1 where nothing need be adjusted. Notes which edges are adjustable.
+    What the slowness of now costs on its way to 1 counts as time that cannot be adjusted.
     """
     whole = middle(path, count, part, now, graph)
+    natural = whole + carried(whole, weighing.ramp * graph.fps, now.slowness)
     want = aim * graph.fps
     adjustable = scratch.adjustable
     for k in range(count + 1):
         adjustable[k] = False
-    if abs(whole - want) < 0.5:  # half a frame
+    if abs(natural - want) < 0.5:  # half a frame
         return 1.0, VALID
-    slower = want > whole
+    slower = want > natural
     some, x = 0.0, 0.0
     for k in range(count + 1):
         s = now.stretch if k == 0 else path[k - 1]
@@ -195,8 +197,7 @@ def time_scale(path, count, part, aim, now, graph, scratch):
             some += length
     if some < 0.5:
         return 1.0, STIFF
-    scale = (want - (whole - some)) / some
-    return scale, VALID
+    return (want - (natural - some)) / some, VALID
 
 
 @lean_kernel
@@ -286,7 +287,7 @@ def time_path(path, count, part, aim, scale, now, graph, weighing, scratch):
     """When each frame of a path is shown, with its speed adjusted smoothly. Returns (frames, s).
 
     s [-] is what adjustable edges are slowed by at most: that of Eq. 3, but farther from 1 because
-    it comes and goes in ramps.
+    it comes and goes in ramps. Where it is beyond what is allowed it is told, and not played.
     """
     ramp = weighing.ramp * graph.fps
     frames = fill(count + 1, scratch.upto, scratch.adjustable, ramp, scratch.at, scratch.weight)
@@ -296,11 +297,9 @@ def time_path(path, count, part, aim, scale, now, graph, weighing, scratch):
         whole = middle(path, count, part, now, graph)
         want = aim * graph.fps
         scale = solve(scratch.at, scratch.weight, frames, whole, want, ramp, now.slowness)
-        scale = max(
-            scale, 0.5 / weighing.most
-        )  # the dropped, too, are timed without standing still
+    played = min(max(scale, 1.0 / weighing.most), weighing.most)
     phase_times(
-        scratch.at, scratch.weight, frames, scale, ramp, now.slowness, graph.fps, scratch.when
+        scratch.at, scratch.weight, frames, played, ramp, now.slowness, graph.fps, scratch.when
     )
     return frames, scale
 
@@ -343,7 +342,7 @@ def weigh(
     (e, e_avoidance, e_body, e_timescale, e', d, d0, s). main: the attack to be avoided, whose time
     is ``aim`` [s]; of the others it is enough not to be hit. masks: see :func:`certainly_hit`.
     """
-    scale, outcome = time_scale(path, count, part, aim, now, graph, scratch)
+    scale, outcome = time_scale(path, count, part, aim, now, graph, weighing, scratch)
     if outcome != VALID:
         return outcome
     most = weighing.most

@@ -52,7 +52,9 @@ def cell_of(x, y, z):
 
 @lean_kernel
 def cells_of(x, y, z, r, seen, stamp, out):
-    """Cells that a sphere meets and that are not stamped yet, into ``out``. Returns their number."""
+    """Cells that a sphere meets and that are not stamped yet, into ``out``, which has room for all.
+    Returns their number.
+    """
     n = 0
     r = r + MARGIN
     half = 0.5 * ACROSS * CELL
@@ -88,9 +90,10 @@ def enter(
     """Cells that ``count`` paths of one state leave: keys and numbers of paths, into key and of.
 
     A sphere of the body counts in the cell that its middle is in, and an attack looks so much
-    farther: far fewer entries than cells that are touched, and the same paths or a few more. moves [A, B] bool: spheres that leave their place in a part. size [cells] counts
-    entries, box [2, 3] grows around middles. Returns
-    how many there are; if more than there is room for, the rest is only counted.
+    farther: far fewer entries than cells that are touched, and the same paths or a few more.
+    moves [A, B] bool: spheres that leave their place in a part. size [cells] counts entries, box
+    [2, 3] grows around middles. Returns how many there are; if more than there is room for, the
+    rest is only counted.
     """
     n, room = 0, key.shape[0]
     for c in range(count):
@@ -206,9 +209,9 @@ def spheres_that_leave(centre, begins, ends, left, out):
 
 @kernel
 def draw_masks(centre, radius, begins, ends, least, origin, bits):
-    """Set the pixels [A, slices, rows] whose boxes lie within reach of one sphere throughout a part.
+    """Set the pixels [A, slices, rows] whose boxes are in reach of one sphere throughout a part.
 
-    Within reach: so near to it that an attack of radius ``least`` there overlaps it.
+    In reach: so near to it that an attack of radius ``least`` there overlaps it.
     """
     for a in range(begins.shape[0]):
         for j in range(radius.shape[0]):

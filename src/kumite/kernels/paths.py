@@ -36,7 +36,7 @@ def enumerate_paths(state, ahead, low, high, graph, node, way, gone, path, lengt
     (exclusive), ``ahead`` of which pass before the state. Depth first, actions in order.
 
     length [C], part [C]: edges of each, and the part. node, way, gone [D]: room to work in. Returns
-    how many there are: more than there is room for are counted, not kept; those of more than D
+    how many there are, C + 1 where there are more than there is room for; those of more than D
     edges are left out.
     """
     count, room = 0, length.shape[0]
@@ -55,12 +55,13 @@ def enumerate_paths(state, ahead, low, high, graph, node, way, gone, path, lengt
         for p in range(graph.part_of[s], graph.part_of[s + 1]):
             middle = gone[d] + 0.5 * (graph.begins[p] + graph.ends[p]) - before
             if low < middle < high:
-                if count < room:
-                    for k in range(d):
-                        path[count, k] = graph.stretch[way[k] - 1]
-                    path[count, d] = s
-                    length[count] = d + 1
-                    part[count] = p
+                if count == room:
+                    return count + 1
+                for k in range(d):
+                    path[count, k] = graph.stretch[way[k] - 1]
+                path[count, d] = s
+                length[count] = d + 1
+                part[count] = p
                 count += 1
         after = gone[d] + graph.last[s] - before
         to = graph.target[s]
@@ -111,8 +112,9 @@ def find(
                 present += 1
     if use_index and state >= 0:
         count = look_up(
-            state, facing, ahead, low, high, attacks, main, weighing.widest, index, stamp, room.turn, room.seen,
-            room.seen_path, room.found, path[present:], length[present:], part[present:],
+            state, facing, ahead, low, high, attacks, main, weighing.widest, index, stamp,
+            room.turn, room.seen, room.seen_path, room.found,
+            path[present:], length[present:], part[present:],
         )  # fmt: skip
         count += present
         if count <= length.shape[0]:
@@ -141,7 +143,7 @@ def timing(path, count, part, aim, now, graph, weighing, scratch):
 
     What cannot be timed is played as it was captured, or with the farthest scale allowed.
     """
-    scale, _ = time_scale(path, count, part, aim, now, graph, scratch)
+    scale, _ = time_scale(path, count, part, aim, now, graph, weighing, scratch)
     scale = min(max(scale, 1.0 / weighing.most), weighing.most)
     lay(path, count, now, graph, scratch)
     frames, _ = time_path(path, count, part, aim, scale, now, graph, weighing, scratch)

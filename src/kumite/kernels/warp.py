@@ -3,12 +3,26 @@
 The *slowness* of a path is how long a frame of capture is shown: σ(x) = 1 + (s - 1) w(x) + (σ₀ - 1)
 r(x), at x frames from now. w is 0 in edges that may not be adjusted and goes up and down by ramps
 inside the others, r falls from 1 to 0 in one ramp, so that a slowness σ₀ of now goes over without a
-jump. Time is the integral of σ: linear in s, so s follows from a time to be kept.
+jump. w + r is at most 1, so σ is between the least and the largest of 1, s and σ₀: time never
+stands still. It is the integral of σ: linear in s, so s follows from a time to be kept.
 """
 
 from __future__ import annotations
 
 from kumite.kernels.jit import lean_kernel
+
+
+@lean_kernel
+def passing(x, ramp):
+    """r(x): how much of the slowness of now is left."""
+    return max(0.0, 1.0 - x / ramp) if ramp > 0.0 else 0.0
+
+
+@lean_kernel
+def carried(x, ramp, slowness):
+    """Frames by which x frames take longer because of the slowness of now."""
+    over = min(x, ramp)
+    return (slowness - 1.0) * (over - 0.5 * over * over / ramp) if over > 0.0 else 0.0
 
 
 @lean_kernel
@@ -47,16 +61,11 @@ def fill(edges, upto, adjustable, ramp, at, weight):
         i = first
         while i < n and at[i] <= high:
             if way > 0.0:
-                weight[i] = max(0.0, min(1.0, min(at[i] - low, high - at[i]) / way))
+                slope = max(0.0, min(1.0, min(at[i] - low, high - at[i]) / way))
+                weight[i] = min(slope, 1.0 - passing(at[i], ramp))
             i += 1
         k += 1
     return n
-
-
-@lean_kernel
-def passing(x, ramp):
-    """r(x): how much of the slowness of now is left."""
-    return max(0.0, 1.0 - x / ramp) if ramp > 0.0 else 0.0
 
 
 @lean_kernel

@@ -13,11 +13,10 @@ from kumite.errors import KumiteError
 from kumite.kernels import ball as kernels
 from kumite.kernels.blow import NO_HIT
 from kumite.rotation import rotate
-from kumite.scene.fighters import Finite, Positive, Settings
-from kumite.scene.stage import SceneObject
+from kumite.scene.fighters import Finite, Settings
+from kumite.scene.stage import OUT_OF_SIGHT, SceneObject
 
 POOL = 12  # balls that are seen at once: the oldest is thrown again
-OUT_OF_SIGHT = np.array([0.0, -50.0, 0.0])  # m, of a ball that has not been thrown yet
 BOUNCE = 0.55  # share of its speed that a ball keeps when it bounces off the floor …
 OFF_A_BODY = 0.25  # … and off somebody
 ROLLING = 0.6  # 1/s, the rate at which a ball that lies comes to rest
@@ -57,12 +56,13 @@ class Balls:
     def __init__(self, settings: BallsSettings, body: Body, fps: float) -> None:
         self.settings, self.body, self.fps = settings, body, fps
         self.objects = [
-            SceneObject(f"ball {n + 1}", OUT_OF_SIGHT.copy(), settings.radius)
+            SceneObject(f"ball {n + 1}", OUT_OF_SIGHT.copy(), settings.radius, thrown=True)
             for n in range(settings.pool)
         ]
         count = settings.pool
         self.position = np.tile(OUT_OF_SIGHT, (count, 1))
         self.velocity = np.zeros((count, 3))
+        self.radius = np.full(count, settings.radius)
         self.used = np.zeros(count, dtype=bool)
         self.attack: list[Attack | None] = [None] * count  # while it has met nothing
         self.thrown = 0
@@ -70,13 +70,19 @@ class Balls:
         self._part = np.zeros(count, dtype=np.int64)
         self._when = np.zeros(count)
 
-    def throw(self, position: np.ndarray, velocity: np.ndarray, now: float) -> int:
-        """Throw the ball that has lain longest; its number. Errors: a throw that makes no sense."""
+    def throw(
+        self, position: np.ndarray, velocity: np.ndarray, now: float, radius: float | None = None
+    ) -> int:
+        """Throw the ball that has lain longest, of its settings' radius [m] or another; its number.
+
+        Errors: a throw that makes no sense.
+        """
         n = self.thrown % len(self.objects)
         s = self.settings
         name = f"throw {self.thrown + 1}"
-        attack = thrown(position, velocity, s.radius, when=now, gravity=s.gravity, name=name)
-        self.attack[n] = attack
+        radius = s.radius if radius is None else float(radius)
+        attack = thrown(position, velocity, radius, when=now, gravity=s.gravity, name=name)
+        self.attack[n], self.radius[n], self.objects[n].radius = attack, radius, radius
         self.position[n], self.velocity[n], self.used[n] = position, velocity, True
         self.thrown += 1
         return n
@@ -84,8 +90,9 @@ class Balls:
     def step(
         self, roots: np.ndarray, capsules: np.ndarray
     ) -> list[tuple[int, int, int, np.ndarray]]:
-        """One frame; hits: (ball, character, part, its velocity [3] m/s). capsules [2, 2, K, P, 3]: ends a and b
-        of everybody's parts, before and now.
+        """One frame; hits: (ball, character, part, its velocity [3] m/s).
+
+        capsules [2, 2, K, P, 3]: ends a and b of everybody's parts, before and now.
         """
         dt, s = 1.0 / self.fps, self.settings
         fly = np.flatnonzero(self.used)
@@ -97,7 +104,7 @@ class Balls:
         self.velocity[fly, 1] -= s.gravity * dt
         hits = []
         who, part, when = self._who[: len(fly)], self._part[: len(fly)], self._when[: len(fly)]
-        radius = np.full(len(fly), s.radius)
+        radius = self.radius[fly]
         kernels.first_met(
             before, self.position[fly], radius, capsules[0, 0], capsules[1, 0], capsules[0, 1],
             capsules[1, 1], self.body.radius_start, self.body.radius_end, roots,
@@ -125,7 +132,7 @@ class Balls:
         self.attack[n] = None
 
     def _fall(self, n: int, dt: float) -> None:
-        r = self.settings.radius
+        r = self.radius[n]
         if self.position[n, 1] >= r:
             return
         self.attack[n] = None

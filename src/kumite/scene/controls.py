@@ -1,13 +1,17 @@
-"""What may be told to a fighter of a game tree while it fights; its next decision uses it (B12)."""
+"""What may be told to a fighter of a game tree while it fights; its next decision uses it (B12).
+And to those who avoid: their next search does.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
 from kumite.control import STYLES, Route
+from kumite.control.avoidance import AvoidanceSearch
 from kumite.control.game_tree import GameTree, Player
 from kumite.control.styles import ANGLES
 from kumite.errors import KumiteError
@@ -131,3 +135,52 @@ def heed(player: Player, field: str) -> str | None:
     weight = getattr(HEEDED, field)
     player.style = player.style.changed(**{field: weight})
     return f"{field} was 0, so that it had no effect: set to {weight:g}"
+
+
+SEARCH_SPANS = {  # least, most, step, and what it is called
+    "window": (0.1, 4.0, 0.05, "T_window [s]"),
+    "clearance": (0.0, 0.3, 0.005, "clearance [m]"),
+}
+WEIGHTS = ("avoidance", "body", "timescale")  # in the order of the search's
+HEAVIEST = 10.0
+
+
+class Searching(Protocol):
+    """A scene in which somebody avoids."""
+
+    search: AvoidanceSearch
+
+    def tune(self, **rules: object) -> None:
+        """Other rules for the next searches."""
+        ...
+
+
+class SearchControl:
+    """A number that searches go by."""
+
+    def __init__(self, scene: Searching, field: str) -> None:
+        self.scene, self.field = scene, field
+        spans = SEARCH_SPANS.get(field, (0.0, HEAVIEST, 0.1, f"weight of {field}"))
+        self.minimum, self.maximum, self.step, self.name = spans
+        self.minimum, self.maximum = min(self.minimum, self.value), max(self.maximum, self.value)
+
+    @property
+    def value(self) -> float:
+        rules = self.scene.search.settings
+        if self.field in WEIGHTS:
+            return float(rules.weights[WEIGHTS.index(self.field)])
+        return float(getattr(rules, self.field))
+
+    def set(self, value: float) -> None:
+        """Errors: values that are not allowed."""
+        if self.field in WEIGHTS:
+            weights = list(self.scene.search.settings.weights)
+            weights[WEIGHTS.index(self.field)] = float(value)
+            self.scene.tune(weights=tuple(weights))
+        else:
+            self.scene.tune(**{self.field: float(value)})
+
+
+def search_controls(scene: Searching) -> list[SearchControl]:
+    """All numbers that may be tuned while a scene runs."""
+    return [SearchControl(scene, field) for field in (*WEIGHTS, *SEARCH_SPANS)]

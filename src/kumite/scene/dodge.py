@@ -8,15 +8,18 @@ import numpy as np
 from pydantic import Field
 
 from kumite.body import lay_body
-from kumite.control.avoidance import AvoidanceSearch, AvoidanceRules
+from kumite.control.attack import thrown
+from kumite.control.avoidance import AvoidanceRules, AvoidanceSearch
 from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.scene.balls import Balls, BallsSettings, aimed, capsules_of, velocity_to
-from kumite.scene.dodgers import Dodgers
+from kumite.scene.controls import SearchControl, search_controls
+from kumite.scene.dodgers import Dodgers, background
 from kumite.scene.fighters import Finite, Metres, Name, Settings
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.recording import Event
 from kumite.scene.stage import SceneObject
+from kumite.synthesis.cast import FASTEST
 
 AIM_SPREAD = 0.03  # m by which throws miss the middle of what they are aimed at
 RECOIL = 0.01  # m that a struck segment gives way per m/s of the ball
@@ -60,7 +63,7 @@ class DodgeSettings(Settings):
     body: Annotated[Finite, Field(ge=0)] = 1.0
     timescale: Annotated[Finite, Field(ge=0)] = 1.0
     clearance: Annotated[Finite, Field(ge=0, le=1)] = 0.04  # m
-    most: Annotated[Finite, Field(ge=1, le=16)] = 4.0
+    most: Annotated[Finite, Field(ge=1, le=FASTEST)] = 4.0
     latency: Annotated[int, Field(ge=1, le=120)] = 1  # frames until a search is taken up
     index: bool = True
     culling: bool = True
@@ -97,8 +100,21 @@ class DodgeScene:
         self.balls_settings = settings.balls or BallsSettings()
         self.search = AvoidanceSearch(library, self.dodge.search())
         _ = self.search.masks, self.search.index  # made now, not at the first throw
+        self._streams: bool | None = None  # None: as many throws as the settings say
         self.body = lay_body(self.skeleton)
         self.reset(seed)
+        background().submit(self._search_once).result()
+
+    def _search_once(self) -> None:
+        """What first searches would compile or load must not hold up a picture."""
+        goal, yaw = self.root_position[0], self.cast.facing[0, 2]
+        before = np.array([np.sin(yaw), 0.0, np.cos(yaw)])
+        attack = thrown(goal + 4.0 * before, -8.0 * before, 0.1, gravity=0.0, seconds=1.0)
+        standing, parts = self.dodgers.standing(0), self.search.graph.part_of
+        for attacks in ([attack], [attack, attack]):  # arrays of other kinds
+            self.search.search(standing, attacks, 0.0)
+        edge = int(np.flatnonzero(np.diff(parts))[0])
+        self.search.timed(standing, (edge,), int(parts[edge]), 1.0, 0.0)
 
     def reset(self, seed: int) -> None:
         """Start again from the beginning, with a seed."""
@@ -110,6 +126,7 @@ class DodgeScene:
         self.dodgers = Dodgers(self.search, homes, rng, self._event, latency=self.dodge.latency)
         # What is thrown does not depend on how it is avoided: searches can be compared.
         self._thrower, self._by_seed = np.random.default_rng([self.seed, 1]), 0
+        self._by_hand = np.random.default_rng([self.seed, 2])
         self.balls = Balls(self.balls_settings, self.body, self.fps)
         self._number: dict[int, tuple[int, int]] = {}  # ball -> number of the throw, whom at
         self._capsules = self._pose()
@@ -133,17 +150,58 @@ class DodgeScene:
     def move_object(self, name: str, position: np.ndarray) -> None:
         """Balls are thrown, not carried."""
 
-    def throw(self, position: np.ndarray, goal: np.ndarray, speed: float, at: int = 0) -> None:
+    @property
+    def controls(self) -> list[SearchControl]:
+        """What of the search may be tuned while it runs."""
+        return search_controls(self)
+
+    def tune(self, **rules: object) -> None:
+        """Other rules for the next searches; those under way keep theirs. Errors: values that are
+        not allowed, or rules that cannot change.
+        """
+        self.search = self.search.tuned(**rules)
+        self.dodgers.search = self.search
+
+    @property
+    def streams(self) -> bool:
+        """Whether balls come by themselves."""
+        return (
+            self._by_seed < self.balls_settings.throws if self._streams is None else self._streams
+        )
+
+    @streams.setter
+    def streams(self, on: bool) -> None:
+        self._streams = on
+
+    def throw(
+        self,
+        position: np.ndarray,
+        goal: np.ndarray,
+        speed: float,
+        at: int = 0,
+        radius: float | None = None,
+    ) -> None:
         """Throw a ball from a place [3] so that it comes by a goal [3]; speed [m/s] is the mean.
 
-        at: the dodger who is to mind it. Errors: a throw that makes no sense.
+        at: the dodger who is to mind it. radius [m]: the settings' by default. Errors: a throw that
+        makes no sense.
         """
         gravity = self.balls_settings.gravity
         velocity = velocity_to(np.asarray(position, float), np.asarray(goal, float), speed, gravity)
-        self._throw(np.asarray(position, dtype=float), velocity, at)
+        self._throw(np.asarray(position, dtype=float), velocity, at, radius)
 
-    def _throw(self, position: np.ndarray, velocity: np.ndarray, at: int) -> None:
-        n = self.balls.throw(position, velocity, self.frame / self.fps)
+    def throw_one(self, speed: float | None = None, radius: float | None = None) -> None:
+        """Throw a ball as those that come by themselves, at another speed [m/s] or of another
+        radius [m]; they stay as they are.
+        """
+        s = self.balls_settings
+        s = s if speed is None else s.model_copy(update={"speed": (speed, speed)})
+        self._throw_at_someone(self._by_hand, s, radius)
+
+    def _throw(
+        self, position: np.ndarray, velocity: np.ndarray, at: int, radius: float | None = None
+    ) -> None:
+        n = self.balls.throw(position, velocity, self.frame / self.fps, radius)
         number = self.balls.thrown
         if n in self._number:
             self._over(n)
@@ -166,8 +224,10 @@ class DodgeScene:
     def step(self) -> bool:
         """One frame: throws that are due, searches and edges, balls and what they meet."""
         s, now = self.balls_settings, self.frame / self.fps
-        while self._by_seed < s.throws and now >= s.first + self._by_seed * s.every - 1e-9:
-            self._throw_at_someone()
+        while now >= s.first + self._by_seed * s.every - 1e-9:
+            if self.streams:
+                self._throw_at_someone(self._thrower, s)
+            self._by_seed += 1
         self.dodgers.step(self.frame)
         before, self._capsules = self._capsules, self._pose()
         self.frame += 1
@@ -177,6 +237,7 @@ class DodgeScene:
             self._event(
                 "struck", k, attack=number, part=self.body.parts[part], meant=at == k,
                 speed=round(float(np.linalg.norm(velocity)), 3),
+                place=[round(float(x), 4) for x in self.balls.position[n]],
             )  # fmt: skip
             self.dodgers.forget(number)
             joint, place = int(self.body.joint[part]), self.balls.position[n]
@@ -192,14 +253,15 @@ class DodgeScene:
         self._event("avoided", at, attack=number)
         self.dodgers.forget(number)
 
-    def _throw_at_someone(self) -> None:
-        rng, cast = self._thrower, self.cast
+    def _throw_at_someone(
+        self, rng: np.random.Generator, settings: BallsSettings, radius: float | None = None
+    ) -> None:
+        cast = self.cast
         at = int(rng.integers(len(self.names)))
         spheres = self.search.spheres
         goal = spheres.at(cast.position[at], cast.world_wxyz[at])[rng.integers(len(spheres))]
         goal = goal + rng.normal(0.0, AIM_SPREAD, 3)
-        self._throw(*aimed(rng, self.balls_settings, cast.facing[at], goal), at)
-        self._by_seed += 1
+        self._throw(*aimed(rng, settings, cast.facing[at], goal), at, radius)
 
     def _pose(self) -> np.ndarray:
         return capsules_of(self.body, self.cast.position, self.cast.world_wxyz)

@@ -3,6 +3,7 @@
 The search runs in the background (Oshita & Masaoka 2011, section 6): what it finds is taken up a
 fixed number of frames later, so that a scene shows the same whether a machine is fast or slow. The
 present edge goes on meanwhile; if it ends, another is begun, and paths without that are dropped.
+Only what would be taken up in the very next frame is waited for.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from kumite.rotation import planar_compose, wrap_angle
 from kumite.synthesis import Cast
 
 LATENCY = 1  # frames after which what a search has found is taken up
+PATIENCE = 1  # frames before it is due at which a search is waited for, at the end of an edge
 SOONEST = 4.0  # s before its end from which an attack is minded
 FEW = 3  # of the best ways to go on that are drawn from
 HOME = 0.5  # rad for each metre away from home
@@ -32,7 +34,7 @@ SOON = 0.6  # s after which at the latest it would come
 _POOL: list[ThreadPoolExecutor] = []
 
 
-def _background() -> ThreadPoolExecutor:
+def background() -> ThreadPoolExecutor:
     """One thread for all scenes: kernels in it run beside those of the picture."""
     if not _POOL:
         _POOL.append(ThreadPoolExecutor(1, "avoidance"))
@@ -129,12 +131,19 @@ class Dodgers:
             mind.menaces = [m for m in mind.menaces if m.attack.when[-1] >= now]
         for k, mind in enumerate(self.minds):
             cast.rate[k] = self._rate(mind, now)
-        for k in cast.waiting.tolist():
-            self._go_on(k, self.minds[k], now)
+        while len(waiting := cast.waiting):  # again, where an edge is shorter than a quick frame
+            for k in waiting.tolist():
+                mind = self.minds[k]
+                # Who must choose now and would know better in the next frame waits for it: an
+                # edge taken at random here would make what is found stale.
+                if mind.search is not None and mind.due <= frame + PATIENCE:
+                    self._take_up(k, mind, now)
+                    cast.rate[k] = self._rate(mind, now)
+                self._go_on(k, mind, now)
         for k, mind in enumerate(self.minds):
             if mind.search is None and self._seen(mind, now):
                 mind.due = frame + self.latency
-                mind.search = _background().submit(self._search, *self._asked(k, mind, now))
+                mind.search = background().submit(self.search.search, *self._asked(k, mind, now))
         cast.advance()
 
     def _rate(self, mind: Mind, now: float) -> float:
@@ -200,9 +209,8 @@ class Dodgers:
         if found.outcome not in menace.told or found.outcome == Outcome.FOUND:
             menace.told.add(found.outcome)
             self.tell("avoidance", k, **_told(found, menace))
-        if found.outcome in (Outcome.WIDE, Outcome.LATE):
-            menace.settled = True
-            return
+        # Wide of where it is may be right where it goes next; too late remains so.
+        menace.settled = found.outcome == Outcome.LATE
         if found.outcome != Outcome.FOUND or found.plan is None:
             return
         for path, part in ((found.path, found.plan.part), *found.others):

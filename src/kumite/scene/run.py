@@ -8,6 +8,7 @@ import numpy as np
 
 from kumite.errors import KumiteError
 from kumite.scene.bout import BoutScene
+from kumite.scene.dodge import DodgeScene
 from kumite.scene.live import LiveScene
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.metrics import source_skate
@@ -17,7 +18,7 @@ MOST_BYTES = 16e9  # of one recording
 
 
 def record(
-    scene: LiveScene | BoutScene,
+    scene: LiveScene | BoutScene | DodgeScene,
     seconds: float,
     progress: Callable[[float], None] = lambda share: None,
 ) -> Recording:
@@ -77,6 +78,7 @@ def record(
             "object_size": {o.name: list(o.size) for o in scene.objects if o.size is not None},
             "object_yaw": {o.name: o.yaw for o in scene.objects if o.size is not None},
             "object_line": [o.name for o in scene.objects if o.line],
+            "object_thrown": [o.name for o in scene.objects if o.thrown],
             "aims_at": scene.settings.aims,
             **({"unarmed": list(unarmed)} if (unarmed := getattr(scene, "unarmed", ())) else {}),
             "scene": scene.settings.model_dump(mode="json"),

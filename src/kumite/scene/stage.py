@@ -13,6 +13,7 @@ from kumite.clip import Skeleton
 from kumite.scene.recording import Event, Recording
 
 RADIUS = 0.1  # m of an object of which a recording does not say it
+OUT_OF_SIGHT = np.array([0.0, -50.0, 0.0])  # m, of an object that is not there now
 
 
 @dataclass
@@ -27,6 +28,7 @@ class SceneObject:
     size: tuple[float, float, float] | None = None  # m: width, height and length of a box
     yaw: float = 0.0  # rad, the way a box's length points
     line: bool = False  # round, of that radius
+    thrown: bool = False  # comes and goes: nobody looks for it
 
 
 def recorded_objects(recording: Recording) -> list[SceneObject]:
@@ -42,9 +44,15 @@ def recorded_objects(recording: Recording) -> list[SceneObject]:
             size=_size(sizes[name]) if name in sizes else None,
             yaw=float(yaws.get(name, 0.0)),
             line=name in told.get("object_line", ()),
+            thrown=name in told.get("object_thrown", ()),
         )
         for o, name in enumerate(recording.objects)
     ]
+
+
+def in_sight(position: np.ndarray) -> np.ndarray:
+    """Which of places [..., 3] m are above the ground, or near to it."""
+    return position[..., 1] > 0.5 * OUT_OF_SIGHT[1]
 
 
 def _size(numbers: Sequence[float]) -> tuple[float, float, float]:

@@ -12,7 +12,10 @@ from kumite.scene.actions import ActionPlayback
 from kumite.scene.bout import BoutScene
 from kumite.studio.action_list import ActionList
 from kumite.studio.direction import Direction, Director
+from kumite.studio.dodging import Dodging, Thrower
 from kumite.studio.paths import Sketch
+from kumite.studio.throwing import Throws
+from kumite.studio.volumes import Volumes
 from kumite.studio.wording import EventLog, lines_html, score_html
 
 SLOWEST, FASTEST = 0.1, 4.0
@@ -33,7 +36,7 @@ class Control(Protocol):
         ...
 
 
-class Desk(Director, Protocol):
+class Desk(Director, Thrower, Protocol):
     """What the panel's buttons reach; every call is safe from any thread."""
 
     def toggle(self) -> None:
@@ -89,6 +92,8 @@ class Panel:
         actions: ActionPlayback | None = None,
         fight: BoutScene | None = None,
         sketch: Sketch | None = None,
+        throws: Throws | None = None,
+        volumes: Volumes | None = None,
     ) -> None:
         self._fps = fps
         self._shown: dict[str, Any] = {}
@@ -123,12 +128,15 @@ class Panel:
         follow = gui.add_checkbox("Follow", True, hint="keep the fighters in the middle")
         follow.on_update(_safely(lambda e: desk.set_follow(e.target.value)))
         self._clock = gui.add_html("")
+        self._dodging: Dodging | None = None
+        if throws is not None and volumes is not None:
+            self._dodging = Dodging(server, throws, volumes, desk, _safely)
         self._direction: Direction | None = None
         if fight is not None and sketch is not None:
             with gui.add_folder("Direction"):
                 self._direction = Direction(server, fight, sketch, desk, _safely)
         elif controls:
-            with gui.add_folder("Parameters"):
+            with gui.add_folder("Parameters", expand_by_default=throws is None):
                 for control in controls:
                     _add_control(gui, desk, control)
         self._score = None
@@ -172,6 +180,8 @@ class Panel:
         )
         if self._direction is not None:
             self._direction.show()
+        if self._dodging is not None:
+            self._dodging.show()
         for name, handle, content in (
             ("clock", self._clock, clock),
             ("score", self._score, score_html(log)),
@@ -199,7 +209,7 @@ def _add_control(gui: viser.GuiApi, desk: Desk, control: Control) -> None:
         control.name,
         control.minimum,
         control.maximum,
-        step=span / 100 if span > 0 else 1.0,
+        step=getattr(control, "step", span / 100 if span > 0 else 1.0),
         initial_value=control.value,
     )
     slider.on_update(_safely(lambda e: desk.tune(control, float(e.target.value))))

@@ -9,7 +9,7 @@ import viser
 
 from kumite.rotation import from_yaw
 from kumite.scene.look import Part, shown
-from kumite.scene.stage import SceneObject
+from kumite.scene.stage import SceneObject, in_sight
 from kumite.studio.palette import RGB, mix
 from kumite.studio.ring import STAGE
 
@@ -22,7 +22,9 @@ SETTLE_HALFLIFE = 0.4  # s; the handle rests where the object hangs, not where i
 
 
 class Targets:
-    """A sphere, car or line for every object, and a gizmo at each one that can be dragged."""
+    """A sphere, car or line for every object, and a gizmo at each one that can be dragged. What is
+    far below the ground is hidden.
+    """
 
     def __init__(
         self,
@@ -37,6 +39,7 @@ class Targets:
             else _add_sphere(server, f"{STAGE}/object/{i}", o)
             for i, o in enumerate(objects)
         ]
+        self._radius = np.array([o.radius for o in objects])  # m, as drawn at scale 1
         self._gizmos: dict[int, viser.TransformControlsHandle] = {}
         self._held: set[int] = set()
         self._flash = np.zeros(len(objects))  # s left
@@ -79,11 +82,21 @@ class Targets:
         if name in self._objects:
             self._flash[self._objects.index(name)] = FLASH_SECONDS
 
-    def draw(self, position: np.ndarray, seconds: float) -> None:
-        """Put the objects at ``position`` [O, 3] m, ``seconds`` of wall time after the last."""
+    def draw(self, position: np.ndarray, radius: np.ndarray, seconds: float) -> None:
+        """Put the objects at ``position`` [O, 3] m, ``seconds`` of wall time after the last; balls
+        are of ``radius`` [O] m now.
+        """
         left = 0.5 ** (seconds / SETTLE_HALFLIFE)
+        seen = in_sight(position)
         for i, thing in enumerate(self._shown):
+            if thing.visible != seen[i]:
+                thing.visible = bool(seen[i])
+            if not seen[i]:
+                continue
             thing.position = position[i]
+            scale = float(radius[i] / self._radius[i])
+            if isinstance(thing, viser.IcosphereHandle) and thing.scale != scale:
+                thing.scale = scale
             if self._flash[i] > 0 and isinstance(thing, viser.IcosphereHandle):
                 self._flash[i] = max(self._flash[i] - seconds, 0.0)
                 thing.color = mix(TARGET_COLOUR, STRUCK_COLOUR, self._flash[i] / FLASH_SECONDS)

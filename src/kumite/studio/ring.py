@@ -14,6 +14,8 @@ BACKDROP = (20, 20, 20)  # the dark theme's own background, so that the floor fa
 FOV = 0.70  # rad, vertical: about a 45 mm lens
 EYE_HEIGHT = 1.45  # m
 LOOK_HEIGHT = 0.95  # m
+BACK, FARTHEST = 6.5, 20.0  # m from people at whom things are thrown, at least and at most
+ASIDE = 0.5  # rad off straight before them
 FOLLOW_HALFLIFE = 0.35  # s for the stage to make up half the way to the fighters' midpoint
 
 
@@ -71,8 +73,19 @@ def aim(server: viser.ViserServer, points: np.ndarray, centre: np.ndarray) -> No
     across = np.linalg.svd(flat)[2][0] if len(flat) > 1 and reach > 1e-3 else np.array([0.0, 1.0])
     towards = np.array([across[1], -across[0]])
     towards *= np.sign(towards @ np.array([1.0, 0.6])) or 1.0
-    distance = max((reach + 0.75) / np.tan(FOV / 2), 3.4)
-    eye = towards * distance
+    _look_from(server, towards * max((reach + 0.75) / np.tan(FOV / 2), 3.4), reach)
+
+
+def aim_at(server: viser.ViserServer, points: np.ndarray, yaw: float, centre: np.ndarray) -> None:
+    """The camera of a page from which things are thrown at people at ``points`` [N, 3] m who face
+    ``yaw`` [rad]: before them. It does not go back as far as would show all of many.
+    """
+    reach = float(np.linalg.norm(points[:, [0, 2]] - centre, axis=1).max())
+    distance = np.clip((reach + 0.75) / np.tan(FOV / 2), BACK, FARTHEST)
+    _look_from(server, distance * np.array([np.sin(yaw + ASIDE), np.cos(yaw + ASIDE)]), reach)
+
+
+def _look_from(server: viser.ViserServer, eye: np.ndarray, reach: float) -> None:
     lift = EYE_HEIGHT + 0.35 * max(reach - 2.0, 0.0)  # a crowd is seen from above
     camera = server.initial_camera
     camera.fov = FOV

@@ -23,14 +23,17 @@ from kumite.clip import LIMBS, forward_kinematics
 from kumite.errors import KumiteError
 from kumite.scene.actions import ActionPlayback
 from kumite.scene.bout import BoutScene
+from kumite.scene.dodge import DodgeScene
 from kumite.scene.recording import Event
-from kumite.scene.stage import Playback, Stage
+from kumite.scene.stage import Playback, Stage, in_sight
 from kumite.studio import bodies, props, ring
 from kumite.studio.pace import Pace
 from kumite.studio.panel import FASTEST, SLOWEST, Control, Panel
 from kumite.studio.paths import Path, Paths, Sketch, on_floor, sketched
 from kumite.studio.server import close_server, is_loopback, open_server, url_of
-from kumite.studio.wording import EventLog, place, struck
+from kumite.studio.throwing import Throws
+from kumite.studio.volumes import VolumePicture, Volumes
+from kumite.studio.wording import LANDED, EventLog, is_dodging, place, struck
 
 MOST_DRAWN = 60.0  # pictures a second
 PANEL_PERIOD = 0.2  # s between updates of what is read, not watched
@@ -46,9 +49,11 @@ class _Picture:
     root_position: np.ndarray  # [K, 3] m
     wxyz: np.ndarray  # [K, J, 4]
     objects: np.ndarray  # [O, 3] m
+    radii: np.ndarray  # [O] m
     hits: list[Event] = field(default_factory=list)
     note: str = ""  # behind the time
     paths: list[Path] = field(default_factory=list)  # of whom is sent along check points
+    volumes: VolumePicture | None = None
 
 
 class Studio:
@@ -75,7 +80,7 @@ class Studio:
         self._ended = False
         self._hits: list[Event] = []
         self._pace = Pace(stage.fps)
-        self._log = EventLog(stage.names)
+        self._log = EventLog(stage.names, dodging=is_dodging(stage))
         mesh = body_mesh(stage.skeleton)
         self.server = open_server(host, port, stage.title, strict=strict_port)
         self.url = url_of(host, self.server.get_port())
@@ -93,6 +98,10 @@ class Studio:
         self._targets = props.Targets(server, stage.objects, self.move_object)
         self._bursts = props.Bursts(server)
         self._fight = stage if isinstance(stage, BoutScene) else None
+        self._targeted = np.array([not o.thrown for o in stage.objects], dtype=bool)
+        dodge = stage if isinstance(stage, DodgeScene) else None
+        self._throws = None if dodge is None else Throws(dodge)
+        self._volumes = None if dodge is None else Volumes(server, dodge)
         self._sketch = Sketch()
         self._paths = Paths(server, self._move_check_point)
         self._panel = Panel(
@@ -106,18 +115,25 @@ class Studio:
             actions=stage if isinstance(stage, ActionPlayback) else None,
             fight=self._fight,
             sketch=self._sketch,
+            throws=self._throws,
+            volumes=self._volumes,
         )
         picture = self._look()
-        self._follow.jump(_midpoint(picture))
-        ring.aim(server, _in_view(picture), self._follow.centre)
+        self._follow.jump(self._midpoint(picture))
+        if dodge is None:
+            ring.aim(server, self._in_view(picture), self._follow.centre)
+        else:
+            before = float(dodge.cast.facing[0, 2])
+            ring.aim_at(server, picture.root_position, before, self._follow.centre)
         self._drawn_at = self._panel_at = time.perf_counter()
         with server.atomic():
             self._draw(picture, 0.0)
-        server.on_client_connect(lambda _: self._poke())
+        server.on_client_connect(lambda _: self.wake())
 
     # What the page asks for; any thread.
 
-    def _poke(self) -> None:
+    def wake(self) -> None:
+        """Draw anew, and look at what waits."""
         self._redraw = True
         self._wake.set()
 
@@ -135,14 +151,14 @@ class Studio:
             else:
                 self._playing = not self._playing
             self._pace.restart()
-        self._poke()
+        self.wake()
 
     def step_once(self) -> None:
         """Pause, and move on one frame."""
         with self._lock:
             self._playing = False
             self._step(1)
-        self._poke()
+        self.wake()
 
     def restart(self, seed: int | None = None) -> None:
         """From the start, with ``seed`` or the stage's own."""
@@ -150,7 +166,7 @@ class Studio:
             self.stage.reset(self.stage.seed if seed is None else seed)
             self._after_jump()
             self._rewound = True
-        self._poke()
+        self.wake()
 
     def seek(self, frame: int) -> None:
         """Jump to a frame; a live stage cannot."""
@@ -158,7 +174,7 @@ class Studio:
             if isinstance(self.stage, Playback):
                 self.stage.seek(frame)
                 self._after_jump()
-        self._poke()
+        self.wake()
 
     def choose(self, action: int) -> None:
         """Play an action of a library over and over; other stages have none."""
@@ -168,7 +184,7 @@ class Studio:
                 self._panel.set_length(len(self.stage.recording))
                 self._after_jump()
                 self._playing = self._rewound = True
-        self._poke()
+        self.wake()
 
     def _after_jump(self) -> None:
         self._ended = False
@@ -186,13 +202,13 @@ class Studio:
     def set_follow(self, on: bool) -> None:
         """Keep the fighters' midpoint in the middle of the picture, or not."""
         self._follow.on = on
-        self._poke()
+        self.wake()
 
     def show_decisions(self, on: bool) -> None:
         """List decisions among the events."""
         with self._lock:
             self._log.show_quiet = on
-        self._poke()
+        self.wake()
 
     def tune(self, control: Control, value: float) -> None:
         """Set one of the stage's controls."""
@@ -203,7 +219,7 @@ class Studio:
         """Do something to the stage between two frames, and show it."""
         with self._lock:
             found = act()
-        self._poke()
+        self.wake()
         return found
 
     def _move_check_point(self, who: int, index: int, eye: np.ndarray, way: np.ndarray) -> None:
@@ -217,7 +233,7 @@ class Studio:
         """Put an object at ``position`` [3] m."""
         with self._lock:
             self.stage.move_object(name, position)
-        self._poke()
+        self.wake()
 
     def stop(self) -> None:
         """Let :meth:`run` return."""
@@ -265,12 +281,14 @@ class Studio:
                 break
             self._rewound |= self.stage.frame < before  # what is played over and over
         fresh = self._log.update(self.stage.events, self.stage.frame)
-        self._hits += [e for e in fresh if e.kind == "hit"]
+        self._hits += [e for e in fresh if e.kind in LANDED]
         self._redraw = True
 
     def _tick(self) -> bool:
         """Step what is due and draw it; True while something fades or slides on its own."""
         with self._lock:
+            if self._throws is not None:
+                self._throws.throw()
             if self._playing and (due := self._pace.take()):
                 self._step(due)
             now = time.perf_counter()
@@ -286,7 +304,7 @@ class Studio:
             picture = self._look()
         with self.server.atomic():
             if rewound:
-                self._follow.jump(_midpoint(picture))
+                self._follow.jump(self._midpoint(picture))
                 self._bursts.clear()
             self._draw(picture, min(seconds, LONGEST_TICK))
         self.server.flush()
@@ -301,9 +319,11 @@ class Studio:
             np.array(stage.root_position, dtype=np.float64),
             np.array(stage.wxyz, dtype=np.float64),
             np.array([o.position for o in stage.objects], dtype=np.float64).reshape(-1, 3),
+            np.array([o.radius for o in stage.objects], dtype=np.float64),
             hits,
             f" · frame {stage.clip_frame} of its clip" if isinstance(stage, ActionPlayback) else "",
             self._routes(),
+            None if self._volumes is None else self._volumes.look(),
         )
 
     def _routes(self) -> list[Path]:
@@ -323,9 +343,11 @@ class Studio:
         for hit in picture.hits:
             self._show_hit(hit, position)
         if not (self._targets.held or self._paths.held or self._sketch.who is not None):
-            self._follow.update(_midpoint(picture), seconds)
+            self._follow.update(self._midpoint(picture), seconds)
         self._bodies.draw(position, world, seconds)
-        self._targets.draw(picture.objects, seconds)
+        self._targets.draw(picture.objects, picture.radii, seconds)
+        if self._volumes is not None and picture.volumes is not None:
+            self._volumes.draw(picture.volumes)
         self._paths.draw(picture.paths)
         self._animating = self._bursts.draw(seconds)
         now = time.perf_counter()
@@ -336,6 +358,17 @@ class Studio:
             self._panel.playing(self._playing)
             with self._lock:
                 self._panel.show(self._log, picture.frame, note)
+
+    def _in_view(self, picture: _Picture) -> np.ndarray:
+        """Points [N, 3] m that belong in the picture."""
+        there = self._targeted & in_sight(picture.objects)
+        return np.concatenate([picture.root_position, picture.objects[there]])
+
+    def _midpoint(self, picture: _Picture) -> np.ndarray:
+        """The middle [2] (x, z) of what goes on: of the fighters, or of one and the target."""
+        points = picture.root_position
+        points = points if len(points) > 1 else self._in_view(picture)
+        return points[:, [0, 2]].mean(axis=0)
 
     def _show_hit(self, hit: Event, position: np.ndarray) -> None:
         whom, names = struck(hit), self.stage.names
@@ -352,17 +385,6 @@ class Studio:
         if point is not None:
             speed = hit.data.get("speed")
             self._bursts.add(point, float(speed) if isinstance(speed, int | float) else 5.0)
-
-
-def _in_view(picture: _Picture) -> np.ndarray:
-    """Points [N, 3] m that belong in the picture."""
-    return np.concatenate([picture.root_position, picture.objects])
-
-
-def _midpoint(picture: _Picture) -> np.ndarray:
-    """The middle [2] (x, z) of what goes on: of the fighters, or of one and the target."""
-    points = picture.root_position if len(picture.root_position) > 1 else _in_view(picture)
-    return points[:, [0, 2]].mean(axis=0)
 
 
 def serve(

@@ -7,12 +7,35 @@ from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from kumite.scene.dodge import DodgeScene
 from kumite.scene.recording import Event
+from kumite.scene.stage import Playback, Stage
 from kumite.studio import palette
 
 LINES = 12  # events on the panel
+LANDED = frozenset({"hit", "struck"})  # kinds that are seen where they land
 QUIET_KINDS = frozenset({"decision"})  # several a second: shown only when asked for
-MARKS = {"strike": "○", "hit": "●", "dodge": "↷", "reaction": "↯", "decision": "·"}
+MARKS = {
+    "strike": "○",
+    "hit": "●",
+    "dodge": "↷",
+    "reaction": "↯",
+    "decision": "·",
+    "throw": "○",
+    "avoidance": "◌",
+    "avoided": "↷",
+    "struck": "●",
+    "stale": "×",
+}
+SAID = {
+    "found": "avoids it",
+    "wide": "lets it pass",
+    "early": "has time yet",
+    "hit": "no way out",
+    "no candidate": "no way out in time",
+    "too late": "sees it too late",
+}  # what a search came to
+CANDIDATES = ("hit", "culled", "stiff", "too_fast", "too_long")  # what became of those not taken
 
 
 def _words(value: Any) -> str:
@@ -29,6 +52,8 @@ def _first(data: Mapping[str, Any], *names: str) -> Any:
 
 def struck(event: Event) -> str | None:
     """The character or object that a hit landed on."""
+    if event.kind == "struck":
+        return event.character
     whom = _first(event.data, "target", "victim", "on", "opponent", "object")
     return None if whom is None else str(whom)
 
@@ -57,6 +82,8 @@ def describe(event: Event) -> str:
         if data.get("blocked"):
             said += ", blocked"
         return said
+    if event.kind in DODGING:
+        return DODGING[event.kind](data)
     rest = [
         _number(v) if k in ("action", "label", "name", "kind") else f"{_words(k)} {_number(v)}"
         for k, v in data.items()
@@ -65,11 +92,69 @@ def describe(event: Event) -> str:
     return ", ".join(rest[:4])
 
 
-class EventLog:
-    """The stage's events as the panel shows them: new ones once, scores, the last few lines."""
+def _thrown(data: Mapping[str, Any]) -> str:
+    said = f"ball {data.get('attack', '')} is thrown"
+    return said + (f", {data['speed']:.1f} m/s" if "speed" in data else "")
 
-    def __init__(self, names: Sequence[str]) -> None:
-        self.names = tuple(names)
+
+def _avoided(data: Mapping[str, Any]) -> str:
+    return f"ball {data.get('attack', '')} has met nobody"
+
+
+def _struck(data: Mapping[str, Any]) -> str:
+    said = f"ball {data.get('attack', '')} → {_words(data.get('part', 'body'))}"
+    said += f", {data['speed']:.1f} m/s" if "speed" in data else ""
+    return said + (", meant for another" if data.get("meant") is False else "")
+
+
+def _stale(data: Mapping[str, Any]) -> str:
+    count = data.get("dropped", 0)
+    return f"ball {data.get('attack', '')}: {count} {'path' if count == 1 else 'paths'} too late"
+
+
+def _searched(data: Mapping[str, Any]) -> str:
+    """What a search came to: how many candidates, at what cost, how far away."""
+    outcome, count = data.get("outcome"), data.get("candidates")
+    said = f"ball {data.get('attack', '')}: {SAID.get(str(outcome), _words(outcome))}"
+    if "aim" in data:
+        said += f", in {data['aim']:.2f} s"
+    if outcome != "found":
+        became = [f"{data[n]} {_words(n)}" for n in CANDIDATES if data.get(n)]
+        return said + (f"; of {count} candidates {', '.join(became)}" if became else "")
+    where = "from the index" if data.get("indexed") else "searched"
+    said += f"; {data.get('valid', 0)} of {count} candidates, {where}"
+    if len(data.get("costs", ())) == 3:
+        parts = zip(("avoidance", "body", "timescale"), data["costs"])
+        said += f"; cost {data.get('cost', 0.0):.2f}: "
+        said += ", ".join(f"{name} {cost:.2f}" for name, cost in parts)
+    return said + (f"; {100 * data['distance']:.0f} cm away" if "distance" in data else "")
+
+
+DODGING = {
+    "throw": _thrown,
+    "avoidance": _searched,
+    "avoided": _avoided,
+    "struck": _struck,
+    "stale": _stale,
+}
+"""How what happens to those at whom balls are thrown is said."""
+
+
+def is_dodging(stage: Stage) -> bool:
+    """Whether balls are thrown at those on a stage: in a recording, whether one was."""
+    if isinstance(stage, Playback):
+        return any(e.kind == "throw" for e in stage.recording.events)
+    return isinstance(stage, DodgeScene)
+
+
+class EventLog:
+    """The stage's events as the panel shows them: new ones once, scores, the last few lines.
+
+    dodging: what counts is how many balls were thrown at whom, and how many struck.
+    """
+
+    def __init__(self, names: Sequence[str], *, dodging: bool = False) -> None:
+        self.names, self.dodging = tuple(names), dodging
         self.show_quiet = False
         self.rewind()
 
@@ -81,6 +166,8 @@ class EventLog:
         self._all: deque[Event] = deque(maxlen=LINES)
         self.thrown = dict.fromkeys(self.names, 0)
         self.landed = dict.fromkeys(self.names, 0)
+        self.avoided = dict.fromkeys(self.names, 0)
+        self.struck = dict.fromkeys(self.names, 0)
 
     def update(self, events: Sequence[Event], frame: int) -> list[Event]:
         """Take in what is new, and return it; nothing is returned after a jump backwards."""
@@ -97,11 +184,15 @@ class EventLog:
             self._all.append(event)
             if event.kind not in QUIET_KINDS:
                 self._loud.append(event)
-            if event.kind == "strike" and event.character in self.thrown:
+            if event.character not in self.thrown:
+                continue
+            if event.kind in ("strike", "throw"):
                 self.thrown[event.character] += 1
-            landed = event.kind == "hit" and not event.data.get("blocked")
-            if landed and event.character in self.landed:
+            elif event.kind == "hit" and not event.data.get("blocked"):
                 self.landed[event.character] += 1
+            elif event.kind in ("avoided", "struck"):
+                counts = self.avoided if event.kind == "avoided" else self.struck
+                counts[event.character] += 1
 
     @property
     def lines(self) -> list[Event]:
@@ -116,27 +207,42 @@ def _colour_of(name: str, names: Sequence[str]) -> str:
 
 
 def score_html(log: EventLog, most: int = 8) -> str:
-    """Strikes and hits of every character; the busiest ``most`` of a crowd."""
-    order = sorted(log.names, key=lambda n: -log.landed[n]) if len(log.names) > most else log.names
+    """Strikes and hits of every character, or balls thrown at each, avoided and not; the busiest
+    ``most`` of a crowd, and the sum over all at whom balls are thrown.
+    """
+    columns = {"strikes": log.thrown, "hits": log.landed}
+    if log.dodging:
+        columns = {"thrown": log.thrown, "avoided": log.avoided, "struck": log.struck}
+    key = log.thrown if log.dodging else log.landed
+    order = sorted(log.names, key=lambda n: -key[n]) if len(log.names) > most else log.names
     rows = "".join(
-        f'<tr><td style="color:{_colour_of(n, log.names)};font-weight:600">{html.escape(n)}</td>'
-        f'<td style="text-align:right">{log.thrown[n]}</td>'
-        f'<td style="text-align:right;font-weight:700">{log.landed[n]}</td></tr>'
+        _score_row(n, _colour_of(n, log.names), [c[n] for c in columns.values()])
         for n in order[:most]
     )
+    if log.dodging and len(log.names) > 1:
+        rows += _score_row("all", "inherit", [sum(c.values()) for c in columns.values()])
+    heads = "".join(f'<td style="text-align:right">{name}</td>' for name in columns)
     more = f'<div style="opacity:.6">and {len(log.names) - most} more</div>' * (len(order) > most)
     return (
         '<div style="padding:0 1em .4em;font-size:.85em"><table style="width:100%">'
-        '<tr style="opacity:.6"><td></td><td style="text-align:right">strikes</td>'
-        f'<td style="text-align:right">hits</td></tr>{rows}</table>{more}</div>'
+        f'<tr style="opacity:.6"><td></td>{heads}</tr>{rows}</table>{more}</div>'
     )
+
+
+def _score_row(name: str, colour: str, counts: Sequence[int]) -> str:
+    """A name and its counts, the last of which matters most."""
+    cells = "".join(
+        f'<td style="text-align:right;font-weight:{700 if k == len(counts) - 1 else 400}">{n}</td>'
+        for k, n in enumerate(counts)
+    )
+    return f'<tr><td style="color:{colour};font-weight:600">{html.escape(name)}</td>{cells}</tr>'
 
 
 def _line_html(event: Event, fps: float, names: Sequence[str], faded: float) -> str:
     said = describe(event)
-    if event.kind not in ("strike", "hit"):
+    if event.kind not in ("strike", "hit", *DODGING):
         said = f"{_words(event.kind)}: {said}" if said else _words(event.kind)
-    weight = 600 if event.kind == "hit" and not event.data.get("blocked") else 400
+    weight = 600 if event.kind in LANDED and not event.data.get("blocked") else 400
     cell = "white-space:nowrap;vertical-align:top;padding-right:.5em"
     return (
         f'<tr style="opacity:{1 - faded:.2f}">'

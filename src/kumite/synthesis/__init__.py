@@ -2,6 +2,17 @@
 
 from kumite.synthesis.cast import Cast
 from kumite.synthesis.moment import Moment
+from kumite.synthesis.preparation import (
+    LevelFilter,
+    Preparation,
+    References,
+    curves,
+    level_displacements,
+    prepare_clip,
+    references,
+    repeat_cycle,
+    smooth_levels,
+)
 from kumite.synthesis.ragdoll import (
     EFFECTIVE_MASS,
     Pushed,
@@ -15,12 +26,21 @@ from kumite.synthesis.response import Responses, find_responses
 __all__ = [
     "EFFECTIVE_MASS",
     "Cast",
+    "LevelFilter",
     "Moment",
+    "Preparation",
     "Pushed",
     "Ragdoll",
+    "References",
     "Responses",
     "Tone",
     "blow_impulse",
+    "curves",
     "find_responses",
     "has_physics",
+    "level_displacements",
+    "prepare_clip",
+    "references",
+    "repeat_cycle",
+    "smooth_levels",
 ]

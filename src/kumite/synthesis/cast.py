@@ -40,7 +40,6 @@ class Cast:
         self.count = count
         position, _ = clips.world
         feet = [skeleton.joint(f"{side}_foot") for side in SIDES]
-        legs = [[skeleton.joint(f"{s}_{p}") for p in ("thigh", "shin", "foot")] for s in SIDES]
         capture = kernels.Capture(
             clips.fps,
             clips.root_position,
@@ -50,9 +49,7 @@ class Cast:
             library.contacts.on_ground,
             clips.clip_of_frame,
         )
-        build = kernels.Build(
-            skeleton.parents, skeleton.offsets, np.array(legs), _below(skeleton, legs)
-        )
+        build = build_of(skeleton)
         self.frame = np.zeros(count, dtype=np.int64)  # library frame shown
         self.fraction = np.zeros(count)  # of the way to the next, in [0, 1)
         self.rate = np.ones(count)  # library frames per shown frame, see set_rate
@@ -332,6 +329,12 @@ class Cast:
         speed = np.maximum(np.linalg.norm(velocity, axis=1), 1e-9)
         velocity *= np.minimum(1.0, np.e * RATE * left / speed)[:, None]
         self._offsets.reaction_velocity[k, chain] = velocity
+
+
+def build_of(skeleton: Skeleton) -> kernels.Build:
+    """The skeleton's arrays. Errors: roles of the legs that are missing."""
+    legs = [[skeleton.joint(f"{s}_{p}") for p in ("thigh", "shin", "foot")] for s in SIDES]
+    return kernels.Build(skeleton.parents, skeleton.offsets, np.array(legs), _below(skeleton, legs))
 
 
 def _below(skeleton: Skeleton, legs: list[list[int]]) -> np.ndarray:

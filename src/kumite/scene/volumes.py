@@ -1,0 +1,75 @@
+"""The volumes of an avoidance, to be looked at: the body's, the attacks', and what was left.
+
+All are spheres (Oshita & Masaoka 2011, section 4.2); the last is their avoidance volume: where the
+body was as the avoidance part began, and no longer is.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from kumite.control.attack import Attack
+from kumite.control.avoidance import AvoidanceSearch, Plan, Standing
+from kumite.rotation import planar_apply, planar_compose, planar_inverse
+from kumite.scene.dodgers import Dodgers
+
+MOST_SAMPLES = 60  # of an attack that are shown
+
+
+class Volume(NamedTuple):
+    """N spheres."""
+
+    centre: np.ndarray  # [N, 3] m
+    radius: np.ndarray  # [N] m
+
+
+def body_volume(dodgers: Dodgers, k: int) -> Volume:
+    """The spheres of character k's body now."""
+    cast, spheres = dodgers.cast, dodgers.search.spheres
+    return Volume(spheres.at(cast.position[k], cast.world_wxyz[k]), spheres.radius)
+
+
+def attacks_on(dodgers: Dodgers) -> dict[int, Attack]:
+    """The attacks that anybody still minds, by their numbers."""
+    return {m.number: m.attack for mind in dodgers.minds for m in mind.menaces}
+
+
+def attack_volume(attack: Attack) -> Volume:
+    """An attack's spheres along its way; of a long one some."""
+    count = min(len(attack), MOST_SAMPLES)
+    some = np.linspace(0, len(attack) - 1, count).round().astype(int)
+    return Volume(attack.centre[some].reshape(-1, 3), np.tile(attack.radius, count))
+
+
+def followed(dodgers: Dodgers, k: int) -> Plan | None:
+    """The plan that character k follows, while it still avoids."""
+    return dodgers.minds[k].plan
+
+
+def avoidance_volume(dodgers: Dodgers, k: int) -> Volume:
+    """The avoidance volume of the plan that character k follows; no spheres without one."""
+    mind = dodgers.minds[k]
+    if mind.plan is None:
+        return Volume(np.zeros((0, 3)), np.zeros(0))
+    rest = mind.plan.path[mind.next_edge :]
+    return left_behind(dodgers.search, dodgers.standing(k), rest, mind.plan.part)
+
+
+def left_behind(
+    search: AvoidanceSearch, standing: Standing, path: tuple[int, ...], part: int
+) -> Volume:
+    """The spheres that leave their places in a part of a path's last edge, where they were as it
+    began. Without a path the part is in the present edge.
+    """
+    library, graph = search.library, search.graph
+    facing, anchor, stop = library.clips.facing, standing.anchor, standing.stop
+    for stretch in path:
+        joined = planar_inverse(facing[graph.first[stretch] - 1])
+        anchor = planar_compose(planar_compose(anchor, facing[stop]), joined)
+        stop = int(graph.last[stretch])
+    first, last = int(graph.begins[part]), int(graph.ends[part])
+    centre = search.volumes.centre[first : last + 1].astype(np.float64)  # [n, 3, B]
+    gone = np.linalg.norm(centre - centre[0], axis=1).max(axis=0) >= search.settings.left
+    return Volume(planar_apply(anchor, centre[0].T[gone]), search.spheres.radius[gone])

@@ -1,0 +1,111 @@
+"""Throwing by hand: a click into the picture throws a ball from the viewer's eye.
+
+A ball goes for the body that the clicked ray comes near to, at the point of the ray that is nearest
+to it; if the ray passes everybody, for the ray's point as far away as they are. Clicks come from
+the page's threads and are queued; the thread that steps the scene throws.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections import deque
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from kumite.errors import KumiteError
+from kumite.scene import DodgeScene
+
+SLOWEST, FASTEST = 4.0, 40.0  # m/s
+SMALLEST, LARGEST = 0.03, 0.4  # m
+SPEED = 9.0  # m/s, at first
+NEAR = 1.0  # m from a body to a ray that means it
+BEFORE, BELOW = 0.5, 0.25  # m before and below the eye that a ball leaves the hand
+LONGEST_FLIGHT = 2.5  # s: what would be under way for longer is thrown faster
+MOST_WAITING = 32  # clicks
+
+
+class Aim(NamedTuple):
+    """Whom a ray means, and where a ball is to come by."""
+
+    goal: np.ndarray  # [3] m
+    who: int
+    off: float  # m between ray and body; below 0 through it
+
+
+def aim_along(
+    eye: np.ndarray, way: np.ndarray, centre: np.ndarray, radius: np.ndarray, floor: float
+) -> Aim:
+    """What a ray from an eye [3] along a way [3] means, among bodies of spheres [K, B, 3], [B].
+
+    floor [m]: no goal is lower.
+    """
+    way = way / np.linalg.norm(way)
+    t = np.maximum((centre - eye) @ way, 0.0)  # [K, B]
+    off = np.linalg.norm(centre - eye - t[..., None] * way, axis=2)
+    gap = off - radius
+    met = gap <= 0.0
+    if met.any():  # of those that the ray goes through the first
+        who = int(np.unravel_index(np.where(met, t, np.inf).argmin(), t.shape)[0])
+    else:
+        who = int(np.unravel_index(gap.argmin(), gap.shape)[0])
+    nearest = int(gap[who].argmin())
+    far = t[who, nearest]
+    if gap[who, nearest] > NEAR or far == 0.0:
+        who, far = _passing(eye, way, centre.mean(axis=1))
+    goal = eye + far * way
+    if goal[1] < floor and way[1] < 0.0 and eye[1] > floor:
+        goal = eye + (eye[1] - floor) / -way[1] * way
+    return Aim(goal, who, float(gap[who].min()))
+
+
+def _passing(eye: np.ndarray, way: np.ndarray, middle: np.ndarray) -> tuple[int, float]:
+    """Whose middle [K, 3] a ray comes by nearest before the eye, and how far along [m]."""
+    ahead = (middle - eye) @ way
+    off = np.linalg.norm(middle - eye - ahead[:, None] * way, axis=1)
+    who = int(np.where((ahead > 0.0) == np.any(ahead > 0.0), off, np.inf).argmin())
+    return who, max(float(ahead[who]), 4.0 * BEFORE)
+
+
+@dataclass
+class Throws:
+    """What is thrown by hand, how, and the clicks that wait for it."""
+
+    scene: DodgeScene
+    speed: float = SPEED  # m/s
+    radius: float = 0.11  # m; the scene's at first
+    waiting: deque[tuple[np.ndarray, np.ndarray] | None] = field(
+        default_factory=lambda: deque(maxlen=MOST_WAITING)
+    )
+
+    def __post_init__(self) -> None:
+        self.radius = float(np.clip(self.scene.balls_settings.radius, SMALLEST, LARGEST))
+
+    def click(self, eye: np.ndarray, way: np.ndarray) -> None:
+        """A ray [3], [3] on the stage was clicked. Any thread."""
+        self.waiting.append((eye, way))
+
+    def one(self) -> None:
+        """A ball is to come as by itself. Any thread."""
+        self.waiting.append(None)
+
+    def throw(self) -> None:
+        """Throw what waits. The thread that steps."""
+        while self.waiting:
+            ray = self.waiting.popleft()
+            with contextlib.suppress(KumiteError):  # a throw that makes no sense is none
+                if ray is None:
+                    self.scene.throw_one(self.speed, self.radius)
+                else:
+                    self._throw_along(*ray)
+
+    def _throw_along(self, eye: np.ndarray, way: np.ndarray) -> None:
+        scene, cast = self.scene, self.scene.cast
+        spheres = scene.search.spheres
+        centre = spheres.at(cast.position, cast.world_wxyz)
+        aim = aim_along(eye, way, centre, spheres.radius, self.radius)
+        place = eye + BEFORE * way / np.linalg.norm(way) - [0.0, BELOW, 0.0]
+        place[1] = max(place[1], self.radius)
+        speed = max(self.speed, float(np.linalg.norm(aim.goal - place)) / LONGEST_FLIGHT)
+        scene.throw(place, aim.goal, speed, aim.who, self.radius)

@@ -1,0 +1,72 @@
+"""A small library to avoid with, and throws at whoever stands somewhere in it."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from kumite.clip import concatenate
+from kumite.control.attack import Attack, thrown
+from kumite.control.avoidance import AvoidanceSearch, Standing
+from kumite.graph import Library, build_avoidance_library
+from kumite.performer.avoidance import AVOIDANCE
+from kumite.performer.moves import Move
+from kumite.performer.take import perform_take, vary
+from kumite.rotation import planar_apply, planar_compose
+
+FPS = 30.0
+FEW = ("wait", "duck", "shuffle", "lean_left", "wait", "sidestep_right", "twist_right", "hollow")
+
+
+def performed(labels: tuple[str, ...], seed: int = 7, fps: float = FPS) -> Library:
+    """The performer's moves of the style avoidance, one after the other, as a library."""
+    rng = np.random.default_rng(seed)
+    moves: list[Move] = [AVOIDANCE.find(label) for label in labels]
+    score = [vary(move, AVOIDANCE, rng) for move in moves]
+    clip, _ = perform_take("few", score, AVOIDANCE, rng=rng)
+    return build_avoidance_library(concatenate([clip], fps))
+
+
+@cache
+def few() -> Library:
+    return performed(FEW + FEW[:3])
+
+
+def somewhere(rng: np.random.Generator, library: Library) -> Standing:
+    """Anywhere in a stretch, played at any speed."""
+    table = library.table
+    stretch = int(rng.integers(len(table.first)))
+    low, high = float(table.first[stretch] - 1), int(table.last[stretch])
+    phase = (
+        float(rng.uniform(low, high)) if rng.random() < 0.7 else float(rng.integers(low, high + 1))
+    )
+    anchor = np.array([*rng.uniform(-3, 3, 2), rng.uniform(-np.pi, np.pi)])
+    slowness = float(rng.choice([1.0, 1.0, 0.5, 1.4, 2.5]))
+    return Standing(anchor, phase, high, stretch, slowness)
+
+
+def at_body(
+    rng: np.random.Generator,
+    search: AvoidanceSearch,
+    standing: Standing,
+    now: float = 0.0,
+    *,
+    off: float = 0.05,
+    radius: tuple[float, float] = (0.03, 0.25),
+    seconds: tuple[float, float] = (0.4, 1.9),
+) -> Attack:
+    """A ball aimed at one of the spheres of a body, about ``off`` [m] beside it."""
+    frame = int(standing.phase)
+    some = search.volumes.centre[frame, :, int(rng.integers(len(search.spheres)))].astype(float)
+    goal = planar_apply(standing.anchor, some) + rng.normal(0.0, off, 3)
+    facing = planar_compose(standing.anchor, search.library.clips.facing[frame])
+    bearing, far = facing[2] + rng.uniform(-2, 2), rng.uniform(3, 9)
+    place = np.array([facing[0], 0, facing[1]]) + far * np.array(
+        [np.sin(bearing), 0, np.cos(bearing)]
+    )
+    place[1] = rng.uniform(0.8, 1.9)
+    lasts = rng.uniform(*seconds)
+    velocity = (goal - place) / lasts
+    velocity[1] += 0.5 * 9.81 * lasts
+    return thrown(place, velocity, float(rng.uniform(*radius)), when=now)
