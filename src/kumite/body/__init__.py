@@ -4,7 +4,14 @@ from kumite.body.apart import Apart, keep_out
 from kumite.body.mesh import ROLES, BodyMesh, body_mesh, skin_vertices
 from kumite.body.palette import PALETTES, Palette, palette
 from kumite.body.segments import ARMS, PARTS, Body, lay_body
-from kumite.body.spheres import Spheres, lay_spheres, load_spheres, save_spheres
+from kumite.body.spheres import (
+    Spheres,
+    lay_spheres,
+    limb_spheres,
+    load_spheres,
+    save_spheres,
+    strikes_with,
+)
 
 __all__ = [
     "ARMS",
@@ -20,8 +27,10 @@ __all__ = [
     "keep_out",
     "lay_body",
     "lay_spheres",
+    "limb_spheres",
     "load_spheres",
     "palette",
     "save_spheres",
     "skin_vertices",
+    "strikes_with",
 ]

@@ -260,8 +260,8 @@ class Modeller:
         return out
 
 
-def make_surfaces(skeleton: Skeleton, stance: Stance) -> list[Surface]:
-    """Every piece of a boxer's skin in the standing pose."""
+def make_surfaces(skeleton: Skeleton, stance: Stance, *, armed: bool = True) -> list[Surface]:
+    """Every piece of a boxer's skin in the standing pose, with its sword or without."""
     m = Modeller(skeleton, stance)
     _trunk(m)
     _neck_and_head(m)
@@ -269,7 +269,7 @@ def make_surfaces(skeleton: Skeleton, stance: Stance) -> list[Surface]:
         _arm(m, side, sign)
         _leg(m, side, sign)
         _foot(m, side)
-    if "sword" in skeleton.roles:
+    if armed and "sword" in skeleton.roles:
         _sword(m)
     return m.surfaces
 

@@ -71,13 +71,16 @@ def skin_vertices(
     return vertices, normals / np.maximum(length, 1e-12)
 
 
-def body_mesh(skeleton: Skeleton) -> BodyMesh:
+def body_mesh(skeleton: Skeleton, *, armed: bool = True) -> BodyMesh:
     """The skin of a boxer on any skeleton with the required roles; sizes follow from its bones.
 
+    armed: with the sword that the skeleton may have a joint for.
     Errors: :class:`KumiteError` for roles that are missing and limbs without length.
     """
     stance = stand(skeleton)
-    surfaces = sorted(make_surfaces(skeleton, stance), key=lambda s: ROLES.index(s.role))
+    surfaces = sorted(
+        make_surfaces(skeleton, stance, armed=armed), key=lambda s: ROLES.index(s.role)
+    )
     start = np.cumsum([0, *(len(s.vertices) for s in surfaces)])
     vertices = np.concatenate([s.vertices for s in surfaces])
     normals = np.concatenate([vertex_normals(s.vertices, s.faces) for s in surfaces])

@@ -17,13 +17,17 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from kumite import toml
 from kumite.body.segments import Body, lay_body
-from kumite.clip import ClipSet, Skeleton
+from kumite.clip import LIMBS, ClipSet, Skeleton
 from kumite.errors import KumiteError, unknown
 from kumite.files import writing
 from kumite.rotation import rotate
 
 THICKER = 0.01  # m by which spheres stand out from the capsules they cover
 LARGEST = 1.0  # m, of a sphere on a body
+BLADE = 0.03  # m, radius of the spheres along a sword
+SWORD = "sword"
+"""The role of the joint that carries a sword, and its name among what strikes."""
+_CARRIED = {"hand": ("forearm", "hand"), "foot": ("shin", "foot")}
 
 
 @dataclass(frozen=True)
@@ -91,6 +95,44 @@ def lay_spheres(
             reach = 0.5 * abs(r1 - r0) / max(count - 1, 1)
             radius.append(r0 + t * (r1 - r0) + thicker + reach)
     return Spheres(np.array(joint), np.array(centre), np.array(radius))
+
+
+def limb_spheres(
+    skeleton: Skeleton, limb: str, body: Body | None = None, *, thicker: float = THICKER
+) -> Spheres:
+    """What of a body strikes with a limb: its fist and forearm, foot and shin, or its sword.
+
+    limb: one of ``clip.LIMBS``, or ``sword``: spheres along the blade, from the joint of that role
+    to its tip. Errors: another limb; no sword; not more than 0.
+    """
+    if limb == SWORD:
+        return _blade(skeleton)
+    if limb not in LIMBS:
+        raise unknown("limb", limb, (*LIMBS, SWORD))
+    body = body or lay_body(skeleton)
+    side, end = limb.split("_")
+    rows = [body.part(f"{side}_{part}") for part in _CARRIED[end]]
+    names = ("joint", "start", "end", "radius_start", "radius_end", "mass")
+    arrays = [getattr(body, name)[rows] for name in names]
+    return lay_spheres(skeleton, Body(tuple(body.parts[r] for r in rows), *arrays), thicker=thicker)
+
+
+def strikes_with(skeleton: Skeleton, limb: str) -> str:
+    """What strikes when a limb does: the limb, or the sword in its hand."""
+    if SWORD in skeleton.roles and skeleton.tip(limb)[0] == skeleton.joint(SWORD):
+        return SWORD
+    return limb
+
+
+def _blade(skeleton: Skeleton) -> Spheres:
+    joint = skeleton.joint(SWORD)
+    carrier, point = skeleton.tip(SWORD)
+    if carrier != joint:  # the tip hangs from a joint below: at rest it is so far from the hilt
+        point = skeleton.rest_positions[carrier] + point - skeleton.rest_positions[joint]
+    # The blade is a line: spheres that touch at 1.4 radii from centre to centre are 0.7 thick.
+    count = int(np.ceil(float(np.linalg.norm(point)) / (1.4 * BLADE))) + 1
+    centre = np.linspace(0.0, 1.0, count)[:, None] * point
+    return Spheres(np.full(count, joint), centre, np.full(count, BLADE))
 
 
 class _Sphere(BaseModel):

@@ -58,7 +58,7 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
     """A scene ready to run: library read or performed, policies trained or found."""
     from kumite.control import cache_folder
     from kumite.graph import builtin_library, load_library
-    from kumite.scene import BoutScene, DodgeScene, LiveScene
+    from kumite.scene import BoutScene, DodgeScene, EvasionScene, LiveScene
     from kumite.scene.dodge import DodgeSettings
     from kumite.scene.fighters import BoutSettings
 
@@ -74,6 +74,12 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
             if settings.dodging:
                 style, level = (settings.dodge or DodgeSettings()).library, "avoidance"
             found = builtin_library(cache, progress=stages, style=style, level=level)
+        if settings.attacker:
+            style = settings.attacker[0].library
+            attack = builtin_library(cache_folder(None), progress=stages, style=style)
+            stages("preparing the scene")
+            training = Training(bars)
+            return EvasionScene(settings, found, attack, seed=seed, cache=cache, progress=training)
         stages("preparing the scene")
         if settings.dodging:
             return DodgeScene(settings, found, seed=seed)
@@ -102,7 +108,8 @@ def run(
     settings = _settings(
         scene, count, throws
     )  # before any long work: what is wrong is said at once
-    names = [c.name for c in (*settings.character, *settings.fighters, *settings.dodging)]
+    everyone = (*settings.character, *settings.fighters, *settings.dodging, *settings.attacker)
+    names = [c.name for c in everyone]
     _check_outputs(output or [], [*names, *(["the crowd"] if settings.crowd else [])])
     live = _live_scene(settings, library, seed)
     with progress() as bars:

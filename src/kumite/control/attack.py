@@ -12,7 +12,8 @@ from functools import cached_property
 
 import numpy as np
 
-from kumite.clip import freeze
+from kumite.body import Spheres, limb_spheres
+from kumite.clip import Skeleton, forward_kinematics, freeze
 from kumite.errors import KumiteError
 from kumite.kernels.avoid import Attacks
 
@@ -142,6 +143,35 @@ def thrown(
     centre = p + t[:, None] * v
     centre[:, 1] -= 0.5 * gravity * t**2
     return Attack(when + t, centre[:, None], np.array([radius]), name)
+
+
+def from_limbs(
+    skeleton: Skeleton,
+    root_position: np.ndarray,
+    wxyz: np.ndarray,
+    when: np.ndarray,
+    limb: str,
+    *,
+    spheres: Spheres | None = None,
+    name: str = "blow",
+) -> Attack:
+    """What a limb sweeps through: motion of roots [T, 3] m and rotations [T, J, 4] at times [T] s.
+
+    It may be recorded or foreseen. limb: a hand with its forearm, a foot with its shin (one of
+    ``clip.LIMBS``), or ``sword`` for the blade; spheres: what of it, by default
+    :func:`~kumite.body.limb_spheres`. Errors: an unknown limb; shapes that do not fit; times that
+    do not ascend; what is not finite.
+    """
+    spheres = spheres or limb_spheres(skeleton, limb)
+    root_position, wxyz = np.asarray(root_position, float), np.asarray(wxyz, float)
+    times = np.shape(when)
+    if root_position.shape != (*times, 3) or wxyz.shape != (*times, len(skeleton), 4):
+        raise KumiteError(
+            f"attack {name!r}: roots {list(root_position.shape)} and rotations {list(wxyz.shape)} "
+            f"at times {list(times)}; expected [T, 3], [T, {len(skeleton)}, 4] and [T]"
+        )
+    position, world = forward_kinematics(skeleton, root_position, wxyz)
+    return Attack(np.asarray(when, float), spheres.at(position, world), spheres.radius, name)
 
 
 def packed(

@@ -44,11 +44,13 @@ def write_glb(path: Path | str, recording: Recording, *, fps: float | None = Non
     if fps is not None and fps != recording.fps:
         recording = _at_rate(recording, fps)
     document = _Document(recording.scene, len(recording), recording.fps)
-    mesh = body_mesh(recording.skeleton)
-    skin_data = _share_mesh(document, mesh)
+    unarmed = recording.settings.get("unarmed", ())
+    skins = {}  # by whether they are armed
+    for armed in sorted({name not in unarmed for name in recording.names}):
+        skins[armed] = _share_mesh(document, body_mesh(recording.skeleton, armed=armed))
     bind = document.add(_inverse_bind(recording.skeleton), gltf.MAT4)
     for k, name in enumerate(recording.names):
-        _add_character(document, recording, k, name, skin_data, bind)
+        _add_character(document, recording, k, name, skins[name not in unarmed], bind)
     _add_objects(document, recording)
     with files.writing(path) as temporary:
         temporary.write_bytes(document.to_bytes())

@@ -251,12 +251,14 @@ def contact_sheet(
     follow: bool = True,
     object_position: np.ndarray | None = None,
     objects: Sequence[SceneObject] = (),
+    unarmed: Sequence[int] = (),
 ) -> None:
     """Draw frames of K characters, roots [F, K, 3] and rotations [F, K, J, 4], to a PNG.
 
     ``view``: 'front', 'three-quarter', 'side' or 'top', as the first character faces in the first
     frame shown; with several characters, as it looks at the second. ``follow`` keeps the characters
     in the middle of each cell; otherwise one camera sees all. ``size``: pixels (w, h) of a cell.
+    ``unarmed``: characters whose sword, if the skeleton has one, is not seen.
     ``objects`` [O] are drawn where ``object_position`` [F, O, 3] (m) says.
 
     Errors: shapes that do not fit; no frames; frames out of range; an unknown view.
@@ -289,13 +291,14 @@ def contact_sheet(
             f"sheet: object_position {things.shape}; expected [{count}, {len(objects)}, 3]"
         )
 
-    mesh = body_mesh(skeleton)
+    meshes = {armed: body_mesh(skeleton, armed=armed) for armed in {True, not unarmed}}
     cells = []
     cameras = _cameras(skeleton, root_position[shown], wxyz[shown], view, size, follow)
     for frame, name, camera in zip(shown, names, cameras):
         position, world = forward_kinematics(skeleton, root_position[frame], wxyz[frame])
         shapes = [
-            body_shape(mesh, skeleton, position[k], world[k], looks[k]) for k in range(characters)
+            body_shape(meshes[k not in unarmed], skeleton, position[k], world[k], looks[k])
+            for k in range(characters)
         ]
         for thing, centre in zip(objects, things[frame]):
             shapes += object_shapes(thing, centre)
@@ -317,6 +320,7 @@ def recording_sheet(
     """Draw frames of a recording (twelve at even distances unless given), labelled in seconds."""
     evenly = np.unique(np.linspace(0, len(recording) - 1, 12).round().astype(int))
     chosen = evenly.tolist() if frames is None else list(frames)
+    unarmed = recording.settings.get("unarmed", ())
     contact_sheet(
         path,
         recording.skeleton,
@@ -331,6 +335,7 @@ def recording_sheet(
         follow=follow,
         object_position=recording.object_position,
         objects=recorded_objects(recording),
+        unarmed=[k for k, n in enumerate(recording.names) if n in unarmed],
     )
 
 

@@ -13,14 +13,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from kumite.annotate import AvoidanceParts, find_contacts, find_strikes
+from kumite.annotate import AvoidanceParts, Strikes, find_contacts, find_strikes
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError
 from kumite.graph.distance import PoseFeatures, pose_features
 from kumite.graph.library import Library, chosen_parts, folded, with_parts
 from kumite.graph.transitions import Transitions
 from kumite.kernels import distance as kernels
-from kumite.rotation import planar_apply, planar_inverse
+from kumite.rotation import planar_apply, planar_compose, planar_inverse
 
 EVERY = 0.20  # s between the frames from which an avoidance may be begun
 LEAD = 0.40  # s before a part in which it is entered
@@ -31,6 +31,11 @@ ELSEWHERE = 2  # other ways at a frame of change
 WORST = 1.0  # rad: poses farther apart are not joined …
 FEWEST = 2  # … but every frame keeps its best so many ways into an avoidance
 UNLIKE = 0.10  # m, root mean square: avoidances nearer to each other than that are alike
+RECOVERY = 0.10  # s after an avoidance in which blows are offered, too
+WIND_UP = (0.12, 0.36)  # s before a blow's drive in which it is entered …
+COMMITTED = 0.36  # … and from which on it is gone through with
+BLOWS = 6  # offered at such a frame, at most
+SAME_PLACE = 0.10  # m: blows that land nearer to each other than that are alike
 ROLES = ("head", "chest", "pelvis", "left_hand", "right_hand", "left_foot", "right_foot")
 _SPARE = 8  # rows that the kernel may write beyond the last
 
@@ -42,19 +47,24 @@ def build_avoidance_library(
     every: float = EVERY,
     offered: int = OFFERED,
     worst: float = WORST,
+    blows: bool = False,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> Library:
     """A library whose graph is made of :func:`find_avoiding_transitions`.
 
-    avoidance: its parts; True: as they are found. Errors: there are none.
+    avoidance: its parts; True: as they are found. blows: whether some are offered after each.
+    Errors: there are no parts.
     """
     progress("finding contacts and effective hits")
     contacts, strikes = find_contacts(clips), find_strikes(clips)
     parts = chosen_parts(clips, contacts, avoidance, progress)
     progress("comparing poses")
-    transitions = find_avoiding_transitions(clips, parts, every=every, offered=offered, worst=worst)
+    transitions = find_avoiding_transitions(
+        clips, parts, every=every, offered=offered, worst=worst, strikes=strikes if blows else None
+    )
     progress("folding the graph")
     told = {"level": "avoidance", "every": every, "offered": offered, "worst": worst}
+    told |= {"blows": True} if blows else {}
     return with_parts(folded(clips, contacts, strikes, transitions, parts, told), avoidance)
 
 
@@ -66,11 +76,13 @@ def find_avoiding_transitions(
     offered: int = OFFERED,
     worst: float = WORST,
     features: PoseFeatures | None = None,
+    strikes: Strikes | None = None,
 ) -> Transitions:
     """Transitions into avoidances from everywhere, and between captures now and then.
 
     every [s], offered: how often and how many; worst [rad]: see above. No transition leaves or
-    enters within a part. Errors: no parts, numbers out of range.
+    enters within a part. strikes: blows to strike back with, which are offered just after each
+    part. Errors: no parts, numbers out of range.
     """
     if len(parts) == 0:
         raise KumiteError("no avoidance parts; expected clips in which somebody avoids something")
@@ -92,6 +104,9 @@ def find_avoiding_transitions(
     begun = inside.copy()
     begun[entry[entry < parts.start[part_of_entry]]] = True
     may_leave = ~begun & (since > 0)
+    if strikes is not None:  # and whoever has begun to strike
+        for start, stop in zip(strikes.start.tolist(), strikes.stop.tolist()):
+            may_leave[max(start - round(COMMITTED * fps), 0) : stop] = False
     leaving = np.flatnonzero(may_leave & ((since % step == 0) | ends | _lasts(parts, len(clips))))
     # Where the capture goes on into an avoidance there must be another way, too.
     into = np.zeros(len(clips), dtype=bool)
@@ -136,6 +151,10 @@ def find_avoiding_transitions(
             target.append(int(onward[j]) + 1)
             cost.append(float(d[row, j]))
             left -= 1
+    if strikes is not None and len(strikes):
+        recovers = leaving[_just_after(parts, leaving, round(RECOVERY * fps))]
+        for i, j, c in _strike_back(clips, strikes, features, recovers, begun, worst):
+            source.append(i), target.append(j), cost.append(c)
     pairs, keep = np.unique(np.stack([source, target], axis=1), axis=0, return_index=True)
     costs = np.array(cost, dtype=np.float32)[keep]
     return Transitions(
@@ -171,6 +190,57 @@ def _entries(
             entry.append(j)
             whose.append(p)
     return np.array(entry, dtype=np.int64), np.array(whose, dtype=np.int64)
+
+
+def _just_after(parts: AvoidanceParts, frames: np.ndarray, within: int) -> np.ndarray:
+    """Which frames [S] bool follow the end of a part by up to so many."""
+    last = parts.stop - 1
+    since = np.searchsorted(last, frames, side="right") - 1
+    return (since >= 0) & (frames - last[np.maximum(since, 0)] <= within)
+
+
+def _strike_back(
+    clips: ClipSet,
+    strikes: Strikes,
+    features: PoseFeatures,
+    leaving: np.ndarray,
+    begun: np.ndarray,
+    worst: float,
+) -> list[tuple[int, int, float]]:
+    """Transitions (source, target, cost) into blows from frames [S]: of those that land at about
+    one place, seen from where the blow is entered, only the one that joins best.
+    """
+    soon, late = (round(t * clips.fps) for t in WIND_UP)
+    lead = np.arange(soon, late + 1)
+    usable = strikes.start - late > clips.clip_start[clips.clip_of_frame[strikes.start]]
+    entry = strikes.start[usable, None] - lead  # [X, E]
+    inside = begun[entry].any(axis=1)
+    frame, limb, entry = (
+        strikes.frame[usable][~inside],
+        strikes.limb[usable][~inside],
+        entry[~inside],
+    )
+    if len(entry) == 0 or len(leaving) == 0:
+        return []
+    to_entry = planar_compose(planar_inverse(clips.facing[entry[:, 0]]), clips.facing[frame])
+    lands = planar_apply(to_entry, strikes.tip[frame, limb])
+    d = _between(features, leaving, entry.ravel() - 1).reshape(len(leaving), *entry.shape)
+    own = np.abs(entry[None] - leaving[:, None, None]) < clips.fps
+    d[own & (clips.clip_of_frame[leaving][:, None, None] == clips.clip_of_frame[entry][None])] = (
+        np.inf
+    )
+    out = []
+    for row, i in enumerate(leaving.tolist()):
+        chosen: list[int] = []
+        best = d[row].min(axis=1)
+        for x in np.argsort(best, kind="stable").tolist():
+            if len(chosen) == BLOWS or best[x] > worst:
+                break
+            if np.any(np.linalg.norm(lands[chosen] - lands[x], axis=1) < SAME_PLACE):
+                continue
+            chosen.append(x)
+            out.append((i, int(entry[x, np.argmin(d[row, x])]), float(best[x])))
+    return out
 
 
 def _between(features: PoseFeatures, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:

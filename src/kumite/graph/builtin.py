@@ -50,7 +50,8 @@ def builtin_library(
         event = "both" if avoids else "left"
         library = build_library(clips, event=event, avoidance=avoids, progress=progress)
     elif level == "avoidance":
-        library = build_avoidance_library(concatenate(_voluntary(made), FPS), progress=progress)
+        clips = concatenate(_voluntary(made), FPS)
+        library = build_avoidance_library(clips, blows=not avoids, progress=progress)
     else:
         clips = concatenate(list(made.clips), FPS)
         library = build_action_library(clips, avoidance=avoids, progress=progress)

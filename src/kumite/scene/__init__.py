@@ -3,6 +3,7 @@
 from kumite.scene.actions import ActionPlayback, action_recording
 from kumite.scene.bout import BoutScene
 from kumite.scene.dodge import DodgeScene
+from kumite.scene.evasion import EvasionScene
 from kumite.scene.live import LiveScene
 from kumite.scene.metrics import CharacterMetrics, Metrics, measure
 from kumite.scene.recording import Event, Recording, load_recording, save_recording
@@ -15,6 +16,7 @@ __all__ = [
     "BoutScene",
     "CharacterMetrics",
     "DodgeScene",
+    "EvasionScene",
     "Event",
     "LiveScene",
     "Metrics",

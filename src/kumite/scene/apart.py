@@ -12,6 +12,7 @@ from kumite.body import Body, keep_out
 from kumite.clip import LIMBS
 from kumite.kernels.blow import NO_BLOW
 from kumite.scene.floor import PUSH_SPEED, Floor
+from kumite.synthesis import Cast
 
 ALLOWED = 0.02  # m that parts may be in each other: skin gives
 REACH = 1.8  # m between two pelvises beyond which arms do not meet
@@ -36,23 +37,37 @@ def held_apart(body: Body, thrown: np.ndarray) -> np.ndarray:
 
 def push_apart(floor: Floor) -> None:
     """Carry every two who fight and are deeper than :data:`ALLOWED` in each other a bit apart."""
-    body, cast, thrown = floor.body, floor.cast, floor.blows.thrown
+    cast, thrown = floor.cast, floor.blows.thrown
     for k, o in pairs(floor.opponent):
-        if np.hypot(*(cast.root_position[k] - cast.root_position[o])[[0, 2]]) > REACH:
-            continue
-        found = keep_out(
-            body,
-            cast.position[k],
-            cast.world_wxyz[k],
-            body,
-            cast.position[o],
-            cast.world_wxyz[o],
-            parts=held_apart(body, thrown[k]),
-            other_parts=held_apart(body, thrown[o]),
+        push_two(
+            (floor.body, cast, k, held_apart(floor.body, thrown[k])),
+            (floor.body, cast, o, held_apart(floor.body, thrown[o])),
+            floor.fps,
         )
-        if found.depth <= ALLOWED:
-            continue
-        length = float(np.hypot(*found.displacement))
-        way = min(found.depth - ALLOWED, PUSH_SPEED / floor.fps) * found.displacement / length
-        cast.carry(k, 0.5 * way)
-        cast.carry(o, -0.5 * way)
+
+
+One = tuple[Body, Cast, int, np.ndarray]
+"""A body, the cast that plays it, its number there, and the parts that must not be in another."""
+
+
+def push_two(one: One, other: One, fps: float, speed: float = PUSH_SPEED) -> None:
+    """Carry two who are deeper than :data:`ALLOWED` in each other a bit apart, at most so fast."""
+    (a, cast_a, k, parts), (b, cast_b, o, other_parts) = one, other
+    if np.hypot(*(cast_a.root_position[k] - cast_b.root_position[o])[[0, 2]]) > REACH:
+        return
+    found = keep_out(
+        a,
+        cast_a.position[k],
+        cast_a.world_wxyz[k],
+        b,
+        cast_b.position[o],
+        cast_b.world_wxyz[o],
+        parts=parts,
+        other_parts=other_parts,
+    )
+    if found.depth <= ALLOWED:
+        return
+    length = float(np.hypot(*found.displacement))
+    way = min(found.depth - ALLOWED, speed / fps) * found.displacement / length
+    cast_a.carry(k, 0.5 * way)
+    cast_b.carry(o, -0.5 * way)

@@ -67,6 +67,9 @@ class DodgeSettings(Settings):
     latency: Annotated[int, Field(ge=1, le=120)] = 1  # frames until a search is taken up
     index: bool = True
     culling: bool = True
+    searches: bool = True  # False: they only stand about
+    counters: bool = True  # where a blow has been avoided, they strike back, if they have blows
+    distance: Annotated[Finite, Field(ge=0.5, le=10)] = 1.0  # m kept to whoever attacks
 
     def search(self) -> AvoidanceRules:
         return AvoidanceRules(
@@ -211,7 +214,7 @@ class DodgeScene:
             place=[round(float(x), 4) for x in position],
         )  # fmt: skip
         for k in range(len(self.names)):
-            if k == at or self._comes_near(attack, k):
+            if self.dodge.searches and (k == at or self._comes_near(attack, k)):
                 self.dodgers.menace(k, attack, number)
 
     def _comes_near(self, attack, k: int) -> bool:

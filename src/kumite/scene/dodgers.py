@@ -24,7 +24,12 @@ PATIENCE = 1  # frames before it is due at which a search is waited for, at the 
 SOONEST = 4.0  # s before its end from which an attack is minded
 FEW = 3  # of the best ways to go on that are drawn from
 HOME = 0.5  # rad for each metre away from home
-TOO_FAR = 0.6  # m from home that is not minded
+TOO_FAR = 0.6  # m from home that is not minded …
+ROAMING = 3.0  # … and by those who keep a distance
+TOO_NEAR = 2.0  # rad for each metre nearer than the distance to keep …
+TOO_WIDE = 1.0  # … and for each metre farther
+IN_VAIN = 1.5  # rad, of a blow at nobody …
+SOON = 0.6  # s after which at the latest it would come
 
 _POOL: list[ThreadPoolExecutor] = []
 
@@ -62,6 +67,7 @@ class Mind:
     main: Menace | None = None  # what is searched for
     due: int = 0  # frame at which the search is taken up
     since: list[int] = field(default_factory=list)  # edges begun since it was
+    resolved: list[int] = field(default_factory=list)  # stretches to play, unless it must avoid
 
 
 class Dodgers:
@@ -84,6 +90,9 @@ class Dodgers:
         table = library.table
         part_of = search.graph.part_of
         self._avoids = part_of[1:] > part_of[:-1]
+        peaks = np.sort(self.library.strikes.frame)
+        soon = np.maximum(table.first + round(SOON * self.fps), table.last)
+        self._strikes = np.searchsorted(peaks, soon, "right") > np.searchsorted(peaks, table.first)
         calm = np.flatnonzero(~self._avoids)
         ways = np.diff(table.action_start)[table.target]
         restful = calm[ways[calm] >= np.median(ways[calm])] if len(calm) else np.arange(len(ways))
@@ -93,6 +102,8 @@ class Dodgers:
             self.cast.place(k, int(table.target[stretch]), home)
             self.minds.append(Mind(np.array(home, dtype=float), stretch))
         self.watched: list[np.ndarray | None] = [None] * len(homes)  # [x, z] that each looks at
+        self.distance: float | None = None  # m to keep to it; None: stay at home
+        self.resolve: Callable[[int], Sequence[int]] = lambda k: ()  # stretches to play, if any
         self.cast.show(0.0)
 
     def menace(self, k: int, attack: Attack, number: int) -> Menace:
@@ -209,6 +220,7 @@ class Dodgers:
             aim = found.plan.begins + found.aim
             mind.plan = self.search.timed(self.standing(k), rest, part, aim, now)
             mind.next_edge = 0
+            mind.resolved = []
             for m in mind.menaces:
                 m.covered = m is menace or m.covered
             menace.covered = True
@@ -234,7 +246,8 @@ class Dodgers:
             stretch = mind.plan.path[mind.next_edge]
             mind.next_edge += 1
         else:
-            stretch = self._idle(k, mind)
+            mind.resolved = mind.resolved or list(self.resolve(k))
+            stretch = mind.resolved.pop(0) if mind.resolved else self._idle(k, mind)
             for m in mind.menaces:  # what is still to come is thought about anew
                 m.covered = False
         mind.stretch = stretch
@@ -263,7 +276,11 @@ class Dodgers:
             want = np.arctan2(watched[0] - ends[:, 0], watched[1] - ends[:, 1])
         off = np.abs(wrap_angle(want - ends[:, 2]))
         away = np.linalg.norm(ends[:, :2] - mind.home[:2], axis=1)
-        cost = off + HOME * np.maximum(away - TOO_FAR, 0.0)
+        roams = watched is not None and self.distance is not None
+        cost = off + HOME * np.maximum(away - (ROAMING if roams else TOO_FAR), 0.0)
+        if roams:
+            more = np.linalg.norm(ends[:, :2] - watched, axis=1) - self.distance
+            cost += np.where(more < 0.0, -TOO_NEAR, TOO_WIDE) * more + IN_VAIN * self._strikes[ways]
         few = np.argsort(cost, kind="stable")[:FEW]
         few = few[cost[few] <= cost[few[0]] + 0.15]
         return int(ways[self.rng.choice(few)])

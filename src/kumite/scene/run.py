@@ -80,6 +80,7 @@ def record(
             "object_line": [o.name for o in scene.objects if o.line],
             "object_thrown": [o.name for o in scene.objects if o.thrown],
             "aims_at": scene.settings.aims,
+            **({"unarmed": list(unarmed)} if (unarmed := getattr(scene, "unarmed", ())) else {}),
             "scene": scene.settings.model_dump(mode="json"),
         },
     )

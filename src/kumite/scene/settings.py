@@ -15,6 +15,7 @@ from pydantic import Field, model_validator
 
 from kumite import toml
 from kumite.errors import KumiteError
+from kumite.scene.attackers import AttackerSettings
 from kumite.scene.balls import BallsSettings
 from kumite.scene.dodge import DodgerSettings, DodgersSettings, DodgeSettings
 from kumite.scene.fighters import (
@@ -137,6 +138,7 @@ class SceneSettings(Settings):
     dodgers: DodgersSettings | None = None  # and many more of them
     dodge: DodgeSettings | None = None  # how they search
     balls: BallsSettings | None = None  # and what is thrown
+    attacker: tuple[AttackerSettings, ...] = ()  # or who attacks them
 
     @cached_property
     def dodging(self) -> tuple[DodgerSettings, ...]:
@@ -152,6 +154,21 @@ class SceneSettings(Settings):
     def fighters(self) -> tuple[FighterSettings, ...]:
         """Those named one by one, then those in formation."""
         return self.fighter + (self.pairs.fighters() if self.pairs else ())
+
+    @model_validator(mode="after")
+    def _attackers_fit(self) -> SceneSettings:
+        if not self.attacker:
+            return self
+        if not self.dodging:
+            raise ValueError("[[attacker]]s attack [[dodger]]s; there are none")
+        if self.balls:
+            raise ValueError("[[attacker]]s and [balls] in one scene; expected one of them")
+        libraries = sorted({a.library for a in self.attacker})
+        if len(libraries) > 1:
+            raise ValueError(
+                f"[[attacker]]s with the libraries {' and '.join(libraries)}; expected one"
+            )
+        return self
 
     @model_validator(mode="after")
     def _names_fit(self) -> SceneSettings:
@@ -242,13 +259,18 @@ class SceneSettings(Settings):
     @property
     def names(self) -> tuple[str, ...]:
         """Of all that move by themselves."""
-        return tuple(c.name for c in (*self.characters, *self.fighters, *self.dodging))
+        everyone = (*self.characters, *self.fighters, *self.dodging, *self.attacker)
+        return tuple(c.name for c in everyone)
 
     @property
     def aims(self) -> dict[str, str]:
         """Whom each aims at that always aims at the same."""
         found = {c.name: c.aims_at for c in self.characters if c.aims_at != NEAREST}
-        return found | {f.name: f.against for f in self.fighters if f.against != NEAREST}
+        found |= {f.name: f.against for f in self.fighters if f.against != NEAREST}
+        if len(self.dodging) == len(self.attacker) == 1:
+            mine, its = self.dodging[0].name, self.attacker[0].name
+            found |= {mine: its, its: mine}
+        return found
 
 
 def with_count(settings: SceneSettings, count: int) -> SceneSettings:

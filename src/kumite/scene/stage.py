@@ -117,6 +117,7 @@ class Playback:
         self.skeleton = recording.skeleton
         self.names = recording.names
         self.seed = int(recording.settings.get("seed", 0))
+        self.unarmed = tuple(recording.settings.get("unarmed", ()))
         self.objects = recorded_objects(recording)
         self.load(recording)
 

@@ -9,14 +9,14 @@ however many they are.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 import viser
 
-from kumite.body import ROLES, BodyMesh
+from kumite.body import ROLES, BodyMesh, body_mesh
 from kumite.clip import Skeleton
 from kumite.studio.palette import RGB, mix, outfit
 from kumite.studio.ring import STAGE
@@ -101,17 +101,24 @@ class SkinnedBodies:
     """One skinned mesh a character and colour, its bones in the world's axes."""
 
     def __init__(
-        self, server: viser.ViserServer, skeleton: Skeleton, mesh: BodyMesh, count: int
+        self,
+        server: viser.ViserServer,
+        skeleton: Skeleton,
+        mesh: BodyMesh,
+        count: int,
+        own: Mapping[int, BodyMesh] | None = None,
     ) -> None:
-        weights = dense_weights(mesh, len(skeleton))
+        """own: meshes of characters who do not have the common one."""
         rest = skeleton.rest_positions
         self._flashes = _Flashes(count)
         self._meshes: list[list[tuple[viser.MeshSkinnedHandle, np.ndarray, RGB]]] = []
         for k in range(count):
             colours = outfit(k)
+            mesh_of = (own or {}).get(k, mesh)
+            weights = dense_weights(mesh_of, len(skeleton))
             parts = []
-            for role, faces in faces_by_colour(mesh, colours):
-                piece = cut(mesh, weights, faces)
+            for role, faces in faces_by_colour(mesh_of, colours):
+                piece = cut(mesh_of, weights, faces)
                 bones = len(piece.joints)
                 handle = server.scene.add_mesh_skinned(
                     f"{STAGE}/body/{k}/{role}",
@@ -193,8 +200,18 @@ class CrowdBodies:
 
 
 def show_bodies(
-    server: viser.ViserServer, skeleton: Skeleton, mesh: BodyMesh, names: Sequence[str]
+    server: viser.ViserServer,
+    skeleton: Skeleton,
+    mesh: BodyMesh,
+    names: Sequence[str],
+    unarmed: Sequence[str] = (),
 ) -> Bodies:
-    """Bodies for everyone on the stage, in the way their number asks for."""
-    kind = SkinnedBodies if len(names) < CROWD else CrowdBodies
-    return kind(server, skeleton, mesh, len(names))
+    """Bodies for everyone on the stage, in the way their number asks for.
+
+    unarmed: names of those whose sword is not to be seen; in a crowd it is.
+    """
+    if len(names) >= CROWD:
+        return CrowdBodies(server, skeleton, mesh, len(names))
+    bare = body_mesh(skeleton, armed=False) if unarmed else mesh
+    own = {k: bare for k, name in enumerate(names) if name in unarmed}
+    return SkinnedBodies(server, skeleton, mesh, len(names), own)

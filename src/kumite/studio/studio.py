@@ -93,7 +93,8 @@ class Studio:
     def _build(self, mesh: bodies.BodyMesh) -> None:
         stage, server = self.stage, self.server
         self._follow = ring.Follow(ring.build(server))
-        self._bodies = bodies.show_bodies(server, stage.skeleton, mesh, stage.names)
+        unarmed = getattr(stage, "unarmed", ())
+        self._bodies = bodies.show_bodies(server, stage.skeleton, mesh, stage.names, unarmed)
         self._targets = props.Targets(server, stage.objects, self.move_object)
         self._bursts = props.Bursts(server)
         self._fight = stage if isinstance(stage, BoutScene) else None

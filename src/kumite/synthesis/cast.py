@@ -6,6 +6,8 @@ kernel over all characters; Python objects appear only where a character chooses
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from kumite.clip import SIDES, Skeleton, facing_frame
@@ -187,19 +189,27 @@ class Cast:
         self.frame[k] = int(np.floor(before))
         self.fraction[k] = before - self.frame[k]
 
-    def foresee(self, k: int, frames: int, alone: Cast) -> tuple[np.ndarray, np.ndarray]:
+    def foresee(
+        self, k: int, frames: int, alone: Cast, then: Sequence[int] = ()
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Roots [T, 3] and rotations [T, J, 4] that a character would show next, undisturbed.
 
-        T is ``frames``, or fewer where its action ends before; at its end, what it shows now. It
-        goes on at its rate.
-        alone: a cast of one from the same library, to try it on.
+        T is ``frames``, or fewer where its action, and ``then`` those that it is to take
+        (stretches), end before; at its end, what it shows now. It goes on at its rate.
+        alone: a cast of one from the same library, to try it on; it is left where this leads.
         """
         for name in ("frame", "fraction", "rate", "pace", "stop", "anchor"):
             getattr(alone, name)[0] = getattr(self, name)[k]
         for mine, theirs in zip(alone._offsets, self._offsets):
             mine[0] = theirs[k]
         roots, turns = [], []
-        while len(roots) < frames and not alone._waits[0]:
+        following = iter(then)
+        while len(roots) < frames:
+            if alone._waits[0]:
+                stretch = next(following, None)
+                if stretch is None:
+                    break
+                alone.begin(np.array([0]), np.array([stretch]))
             alone.advance()
             roots.append(alone.root_position[0].copy())
             turns.append(alone.wxyz[0].copy())

@@ -1,0 +1,375 @@
+"""A scene in which people avoid the blows of others, and strike back (Oshita & Masaoka 2011).
+
+Who avoids comes first, then who attacks; each side plays a library of its own. Where only one side
+has swords, everyone has a sword's joint and those of the other side are unarmed: theirs is neither
+seen nor felt.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from kumite.body import ARMS
+from kumite.body.spheres import SWORD
+from kumite.clip import LIMBS, Skeleton
+from kumite.control.attack import Attack
+from kumite.control.avoidance import AvoidanceSearch
+from kumite.control.counter import CounterSearch
+from kumite.errors import KumiteError
+from kumite.graph import Library
+from kumite.rotation import planar_apply, wrap_angle
+from kumite.scene.apart import held_apart, push_two
+from kumite.scene.attackers import Attackers, Blow, middle_of, skill_of
+from kumite.scene.blows import Blows, Contact
+from kumite.scene.dodge import DodgeSettings
+from kumite.scene.dodgers import Dodgers
+from kumite.scene.live import RECOIL
+from kumite.scene.memory import refuse_too_many
+from kumite.scene.recording import Event
+from kumite.scene.stage import SceneObject
+from kumite.synthesis import Cast
+
+ANTICIPATION = 0.4  # s of a dodger's motion that an attacker foresees; then it takes it to stand
+HORIZON = 0.6  # s to which the index looks ahead: of blows, most are over before it would pay
+NEAR = 2.0  # m from a dodger within which a blow that is meant for another menaces it, too
+BOLDNESS = 1.0  # s after an avoided blow in which there is time to strike back
+SAFE = 0.25  # s between a blow back and the next blow that may come
+GOALS = ("head", "chest")  # what blows back are meant for
+TRUNK = ("head", "chest", "pelvis")  # what of an attacker an avoidance must not run into …
+THIN = 0.12  # m, of the spheres there: arms may touch
+PUSH = 1.2  # m/s at most with which two who are in each other are carried apart
+
+
+@dataclass
+class Coming:
+    """A blow that is on its way to one of those who avoid."""
+
+    number: int
+    blow: Blow
+    at: int  # whom it is meant for
+    landed: bool = False
+    gap: float = np.inf  # m between it and the body, had that stayed where it was when it was told
+
+
+class Everyone:
+    """Both casts as one, as far as a recording asks."""
+
+    def __init__(self, casts: Sequence[Cast]) -> None:
+        self._casts = casts
+
+    def _all(self, name: str) -> np.ndarray:
+        return np.concatenate([getattr(cast, name) for cast in self._casts])
+
+    @property
+    def contacts(self) -> np.ndarray:
+        return self._all("contacts")
+
+    @property
+    def held(self) -> np.ndarray:
+        return self._all("held")
+
+    @property
+    def frame(self) -> np.ndarray:
+        return self._all("frame")
+
+    @property
+    def pace(self) -> np.ndarray:
+        return self._all("pace")
+
+
+class EvasionScene:
+    """Dodgers under attack, one frame at a step. The same seed gives the same frames.
+
+    Follows the :class:`~kumite.scene.stage.Stage` protocol, so the studio can show it.
+    """
+
+    def __init__(
+        self,
+        settings,
+        library: Library,
+        attack: Library,
+        *,
+        seed: int = 0,
+        cache: Path | None = None,
+        progress: Callable[[str, int, float], None] = lambda name, sweep, residual: None,
+    ) -> None:
+        """library: of those who avoid; attack: of those who attack.
+
+        Errors: either side is empty; a library without avoidance parts, or one without blows;
+        libraries of different bodies or frame rates; too many characters.
+        """
+        if not (settings.dodging and settings.attacker):
+            raise KumiteError(
+                f"{settings.title!r} needs somebody who avoids and somebody who attacks; expected "
+                "[[dodger]]s and [[attacker]]s"
+            )
+        self.settings, self.library, self.title = settings, library, settings.title
+        self.fps = library.clips.fps
+        if attack.clips.fps != self.fps:
+            raise KumiteError(f"libraries of {self.fps:g} and {attack.clips.fps:g} frames a second")
+        self._dodgers_count = len(settings.dodging)
+        self.names = tuple(s.name for s in (*settings.dodging, *settings.attacker))
+        skeletons = [library.clips.skeleton, attack.clips.skeleton]
+        self.skeleton, self._rows = _shared(skeletons)
+        refuse_too_many(len(self.names), len(self.skeleton))
+        sides = (self.names[: self._dodgers_count], self.names[self._dodgers_count :])
+        self.unarmed = tuple(
+            name
+            for side, own in zip(sides, skeletons)
+            if len(own) < len(self.skeleton)
+            for name in side
+        )
+        self.dodge = settings.dodge or DodgeSettings()
+        self.search = AvoidanceSearch(library, replace(self.dodge.search(), horizon=HORIZON))
+        _ = self.search.masks, self.search.index  # made now, not at the first blow
+        self.skill = skill_of(attack, cache, progress)
+        self._counters = CounterSearch(self.search) if self.dodge.counters else None
+        self.reset(seed)
+
+    def reset(self, seed: int) -> None:
+        """Start again from the beginning, with a seed."""
+        self.seed = int(seed)
+        self.frame = 0
+        self.events: list[Event] = []
+        homes = np.array([[*d.position, np.radians(d.yaw_deg)] for d in self.settings.dodging])
+        rng = np.random.default_rng(self.seed)
+        self.dodgers = Dodgers(self.search, homes, rng, self._event, latency=self.dodge.latency)
+        self.dodgers.distance, self.dodgers.resolve = self.dodge.distance, self._strike_back
+        self.attackers = Attackers(self.skill, self.settings.attacker, self.seed)
+        self.cast = Everyone([self.dodgers.cast, self.attackers.cast])
+        self._sides = (Blows(self.dodgers.cast), Blows(self.attackers.cast))
+        self._heads = middle_of(self.library, self._sides[0].body, "head")
+        self._coming: dict[tuple[int, int, int], Coming] = {}
+        self._numbers = 0
+        self._bold = np.full(self._dodgers_count, -np.inf)  # s until which each strikes back
+        for a in range(self.attackers.cast.count):
+            self._decide(a)
+
+    @property
+    def root_position(self) -> np.ndarray:
+        return np.concatenate([self.dodgers.cast.root_position, self.attackers.cast.root_position])
+
+    @property
+    def wxyz(self) -> np.ndarray:
+        out = np.zeros((len(self.names), len(self.skeleton), 4))
+        out[..., 0] = 1.0
+        out[: self._dodgers_count, self._rows[0]] = self.dodgers.cast.wxyz
+        out[self._dodgers_count :, self._rows[1]] = self.attackers.cast.wxyz
+        return out
+
+    @property
+    def objects(self) -> list[SceneObject]:
+        return []
+
+    def move_object(self, name: str, position: np.ndarray) -> None:
+        """There are none."""
+
+    def step(self) -> bool:
+        """One frame: minds are made up, searches and edges, all move, blows are tested."""
+        dodgers, attackers = self.dodgers, self.attackers
+        for a in attackers.cast.waiting.tolist():
+            attackers.begin(a)
+            self._decide(a)
+        for d in range(self._dodgers_count):
+            foe = self._foe(d)
+            dodgers.watched[d] = attackers.cast.root_position[foe, [0, 2]]
+        dodgers.step(self.frame)
+        attackers.cast.advance()
+        self._keep_apart()
+        self.frame += 1
+        for side, begun in enumerate([s.step() for s in self._sides]):
+            if self._strikes(side):
+                for k, s, blow in begun:
+                    self._tell_strike(side, k, s, blow)
+        for side in (0, 1):
+            if self._strikes(side):
+                self._land(side)
+        self._end_blows()
+        return True
+
+    # Who minds whom ------------------------------------------------------------------------------
+
+    def _foe(self, d: int) -> int:
+        """The attacker nearest to a dodger."""
+        off = self.attackers.cast.root_position - self.dodgers.cast.root_position[d]
+        return int(np.argmin(np.hypot(off[:, 0], off[:, 2])))
+
+    def _victim(self, a: int) -> int:
+        """The dodger nearest to an attacker."""
+        off = self.dodgers.cast.root_position - self.attackers.cast.root_position[a]
+        return int(np.argmin(np.hypot(off[:, 0], off[:, 2])))
+
+    def _decide(self, a: int) -> None:
+        """An attacker makes up its mind, and who may be struck sees what is coming."""
+        attackers, cast, clips = self.attackers, self.dodgers.cast, self.library.clips
+        steps = np.arange(1, max(1, round(ANTICIPATION * self.fps)) + 1)
+        frames = cast.frames_ahead(np.arange(cast.count), steps)  # [D, H]
+        at = self._victim(a)
+        head = planar_apply(cast.anchor[at], self._heads[frames[at]])
+        yaw = cast.anchor[at, 2] + clips.facing[frames[at], 2]
+        root = planar_apply(cast.anchor[:, None], clips.root_position[frames])[..., [0, 2]]
+        stretch, worth = attackers.decide(a, np.column_stack([head, wrap_angle(yaw)]), root)
+        k = self._dodgers_count + a
+        self._event("decision", k, stretch=stretch, worth=round(worth, 6))
+        for blow in attackers.foresee(a, self.frame):
+            self._menace(blow, at)
+        if self.dodge.searches:
+            self._stand_in_the_way(a)
+
+    def _stand_in_the_way(self, a: int) -> None:
+        """An attacker's body, as far as it is known, is to be kept clear of while avoiding."""
+        body = self._sides[1].body
+        rows = [body.part(part) for part in TRUNK]
+        centre = self.attackers.parts_ahead(a, body, rows)
+        when = (self.frame + np.arange(len(centre))) / self.fps
+        attack = Attack(when, centre, np.full(len(rows), THIN), f"body of {a}")
+        for d in range(self._dodgers_count):
+            self.dodgers.menace(d, attack, -1 - a).settled = True  # nobody gets out of its way
+
+    def _menace(self, blow: Blow, at: int) -> None:
+        """A blow has been foreseen, or more of it."""
+        key = (blow.who, blow.limb, blow.blow)
+        known = self._coming.get(key)
+        if known is None:
+            self._numbers += 1
+            known = self._coming[key] = Coming(self._numbers, blow, at)
+        known.blow = blow
+        cast, spheres = self.dodgers.cast, self.search.spheres
+        body = spheres.at(cast.position[at], cast.world_wxyz[at])
+        known.gap = _nearest(blow.attack, body, spheres.radius)
+        self._event(
+            "foreseen", self._dodgers_count + blow.who, attack=known.number,
+            limb=LIMBS[blow.limb], blow=blow.blow, at=self.names[at], gap=round(known.gap, 4),
+            begins=round(float(blow.attack.when[0]), 4),
+        )  # fmt: skip
+        if not self.dodge.searches:
+            return
+        for d in range(self._dodgers_count):
+            off = blow.attack.centre[..., [0, 2]] - cast.root_position[d, [0, 2]]
+            if d == at or np.hypot(off[..., 0], off[..., 1]).min() < NEAR:
+                self.dodgers.menace(d, blow.attack, known.number)
+
+    def _strike_back(self, d: int) -> Sequence[int]:
+        """What a dodger who has just avoided a blow does about it: stretches, if anything."""
+        if self._counters is None or self.frame / self.fps > self._bold[d]:
+            return ()
+        foe, body = self._foe(d), self._sides[1].body
+        rows = [body.part(part) for part in (*GOALS, "pelvis")]
+        goal = self.attackers.parts_ahead(foe, body, rows)
+        radius = 0.5 * (body.radius_start + body.radius_end)[rows]
+        found = self._counters.find(
+            self.dodgers.standing(d), goal[:, :-1], radius[:-1], goal[:, -1]
+        )
+        now = self.frame / self.fps
+        following = min(
+            [float(c.blow.attack.when[0]) for c in self._coming.values()],
+            default=now + self.attackers.known(foe),
+        )
+        if found is None or following < now + found.seconds + SAFE:
+            return ()
+        self._bold[d] = -np.inf
+        limb = LIMBS[int(self.library.strikes.limb[found.blow])]
+        self._event(
+            "counter", d, victim=self.names[self._dodgers_count + foe], limb=limb,
+            blow=found.blow, gap=round(found.gap, 4), seconds=round(found.seconds, 4),
+        )  # fmt: skip
+        return found.path
+
+    # Bodies and blows ----------------------------------------------------------------------------
+
+    def _keep_apart(self) -> None:
+        mine, its = self._sides
+        for d in range(self._dodgers_count):
+            for a in range(self.attackers.cast.count):
+                push_two(
+                    (mine.body, mine.cast, d, held_apart(mine.body, mine.thrown[d])),
+                    (its.body, its.cast, a, held_apart(its.body, its.thrown[a])),
+                    self.fps,
+                    PUSH,
+                )
+
+    def _strikes(self, side: int) -> bool:
+        """Whether one side's blows count: arms of those who only avoid swing as if they struck."""
+        return side == 1 or self._counters is not None
+
+    def _tell_strike(self, side: int, k: int, s: int, blow: int) -> None:
+        told = {}
+        if side == 1 and (k, s, blow) in self._coming:
+            told["attack"] = self._coming[k, s, blow].number
+        self._event("strike", side * self._dodgers_count + k, limb=LIMBS[s], blow=blow, **told)
+
+    def _land(self, side: int) -> None:
+        """Blows of one side that have met somebody: say so, and let the struck segment give."""
+        mine, other = self._sides[side], self._sides[1 - side]
+        for k, s in mine.flying:
+            for victim in range(other.cast.count):
+                met = mine.meets(k, s, other, victim)
+                if met is not None:
+                    mine.landed[k, s] = mine.thrown[k, s]
+                    self._hit(side, k, s, victim, met)
+                    break
+
+    def _hit(self, side: int, k: int, s: int, victim: int, met: Contact) -> None:
+        mine, other = self._sides[side], self._sides[1 - side]
+        part, blow = other.body.parts[met.part], int(mine.thrown[k, s])
+        told = {}
+        if side == 1 and (k, s, blow) in self._coming:
+            coming = self._coming[k, s, blow]
+            coming.landed, told["attack"] = True, coming.number
+        who, whom = (0, self._dodgers_count) if side == 0 else (self._dodgers_count, 0)
+        self._event(
+            "hit", who + k, victim=self.names[whom + victim], limb=LIMBS[s], part=part,
+            speed=round(float(np.linalg.norm(met.velocity)), 4),
+            place=[round(float(x), 4) for x in met.place],
+            time=round((self.frame - 1 + met.share) / self.fps, 4),
+            blocked=part in ARMS and not bool(mine.armed[s]), blow=blow, **told,
+        )  # fmt: skip
+        joint = int(other.body.joint[met.part])
+        other.cast.strike(victim, joint, met.place, RECOIL * met.velocity)
+
+    def _end_blows(self) -> None:
+        """Blows that are over: whoever has not been met has avoided them, and may strike back."""
+        now = self.frame / self.fps
+        for key, coming in list(self._coming.items()):
+            if coming.blow.attack.when[-1] > now + 1e-9:
+                continue
+            del self._coming[key]
+            self.dodgers.forget(coming.number)
+            if not coming.landed:
+                self._event("avoided", coming.at, attack=coming.number)
+                self._bold[coming.at] = now + BOLDNESS
+
+    def _event(self, kind: str, k: int, **data) -> None:
+        self.events.append(Event(self.frame, kind, self.names[k], data))
+
+
+def _nearest(attack: Attack, body: np.ndarray, radius: np.ndarray) -> float:
+    """The smallest gap [m] of an attack to spheres [B, 3] that stay where they are."""
+    off = attack.dense[2][:, :, None] - body
+    return float((np.linalg.norm(off, axis=-1) - attack.radius[:, None] - radius).min())
+
+
+def _shared(skeletons: Sequence[Skeleton]) -> tuple[Skeleton, list[np.ndarray]]:
+    """A skeleton for all, with a sword if any has one, and the joints of each in it.
+
+    Errors: bodies that differ in more than a sword.
+    """
+    largest = max(skeletons, key=len)
+    rows = []
+    for one in skeletons:
+        own = [n for n in largest.names if n in one.names]
+        more = [n for n in largest.names if n not in one.names]
+        sword = [largest.names[largest.roles[SWORD]]] if SWORD in largest.roles else []
+        same = own == list(one.names) and more in ([], sword)
+        at = np.array([largest.names.index(n) for n in own], dtype=np.int64)
+        if not same or not np.allclose(largest.offsets[at], one.offsets, atol=1e-6):
+            raise KumiteError(
+                "the libraries of those who avoid and of those who attack are of different "
+                "bodies; expected one body, with a sword or without"
+            )
+        rows.append(at)
+    return largest, rows
