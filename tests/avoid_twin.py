@@ -108,7 +108,7 @@ class Twin:
                     if low < middle < high:
                         yield (*path, s), p, middle
                 after = gone + table.last[s] - table.first[s] + 1
-                if after < high:
+                if after < high and not self.parts_in(s):
                     yield from onward(int(table.target[s]), (*path, s), after)
 
         found = np.flatnonzero(table.state_frame == standing.stop)

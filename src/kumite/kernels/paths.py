@@ -33,7 +33,8 @@ def soonest(action_start, stretch, first, last, target, part_of, middle, out):
 @lean_kernel
 def enumerate_paths(state, ahead, low, high, graph, node, way, gone, path, length, part):
     """Paths [C, D] from a state whose last edge avoids between ``low`` and ``high`` frames from now
-    (exclusive), ``ahead`` of which pass before the state. Depth first, actions in order.
+    (exclusive), ``ahead`` of which pass before the state, and no other edge does. Depth first,
+    actions in order.
 
     length [C], part [C]: edges of each, and the part. node, way, gone [D]: room to work in. Returns
     how many there are, C + 1 where there are more than there is room for; those of more than D
@@ -65,6 +66,8 @@ def enumerate_paths(state, ahead, low, high, graph, node, way, gone, path, lengt
                 count += 1
         after = gone[d] + graph.last[s] - before
         to = graph.target[s]
+        if graph.part_of[s] < graph.part_of[s + 1]:
+            continue  # whoever avoids once for nothing, to avoid again, moves more than need be
         if d + 1 < DEPTH and after + graph.soonest[to] < high:
             d += 1
             node[d], gone[d], way[d] = to, after, graph.action_start[to]
