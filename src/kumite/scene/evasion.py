@@ -349,7 +349,7 @@ class EvasionScene:
 
 def _nearest(attack: Attack, body: np.ndarray, radius: np.ndarray) -> float:
     """The smallest gap [m] of an attack to spheres [B, 3] that stay where they are."""
-    off = attack.dense[2][:, :, None] - body
+    off = attack.dense[-1][:, :, None] - body
     return float((np.linalg.norm(off, axis=-1) - attack.radius[:, None] - radius).min())
 
 
