@@ -9,6 +9,7 @@ import numpy as np
 from kumite.errors import KumiteError
 from kumite.scene.bout import BoutScene
 from kumite.scene.dodge import DodgeScene
+from kumite.scene.evasion import EvasionScene
 from kumite.scene.live import LiveScene
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.metrics import source_skate
@@ -18,7 +19,7 @@ MOST_BYTES = 16e9  # of one recording
 
 
 def record(
-    scene: LiveScene | BoutScene | DodgeScene,
+    scene: LiveScene | BoutScene | DodgeScene | EvasionScene,
     seconds: float,
     progress: Callable[[float], None] = lambda share: None,
 ) -> Recording:
