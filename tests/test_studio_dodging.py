@@ -12,6 +12,7 @@ from kumite.control.attack import thrown
 from kumite.control.avoidance import AvoidanceRules
 from kumite.errors import KumiteError
 from kumite.graph import Library, builtin_library
+from kumite.rotation import planar_apply
 from kumite.scene import (
     DodgeScene,
     Playback,
@@ -242,11 +243,13 @@ def test_the_avoidance_volume_is_where_the_body_comes_by(avoiders: Library):
         there = cast.frame[0] + cast.fraction[0]
         if mind.next_edge == len(mind.plan.path) and abs(there - begins) < 0.5:
             assert left is not None
-            now = body_volume(stage.dodgers, 0).centre
+            # As captured: what is shown is still being smoothed after a join.
+            place = stage.search.spheres.of_frames(avoiders.clips)[begins].T
+            now = planar_apply(cast.anchor[0], place)
             off = np.linalg.norm(now[:, None] - left.centre, axis=2).min(axis=0)
             near.append(float(off.max()))
     assert len(near) >= 3
-    assert np.median(near) < 0.08  # joins are still being smoothed
+    assert max(near) < 0.01, near
 
 
 def test_an_attack_is_shown_along_its_way():
