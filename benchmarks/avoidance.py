@@ -348,7 +348,9 @@ def chosen(throws: int) -> str:
         for throw in played(name, throws):
             for asked in [s for s in throw.weighed if s.found.outcome == Outcome.FOUND][:1]:
                 have = candidates(search, asked)
-                mine = (asked.found.path, asked.found.plan.part)
+                plan = asked.found.plan
+                assert plan is not None
+                mine = (asked.found.path, plan.part)
                 k = next(n for n, p in enumerate(have.path) if (p, int(have.part[n])) == mine)
                 way = [displacement(search, asked, mine[0], mine[1])]
                 ours.append(way[0])

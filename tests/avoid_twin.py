@@ -35,7 +35,7 @@ class Weighed:
     part: int  # of the library's
     outcome: str
     e: float = np.inf
-    costs: tuple[float, float, float] = (np.nan,) * 3
+    costs: tuple[float, float, float] = (np.nan, np.nan, np.nan)
     overlap: float = 0.0
     d: float = np.nan
     d0: float = np.nan

@@ -37,7 +37,7 @@ def somewhere(rng: np.random.Generator, library: Library) -> Standing:
     """Anywhere in a stretch, played at any speed."""
     table = library.table
     stretch = int(rng.integers(len(table.first)))
-    low, high = float(table.first[stretch] - 1), int(table.last[stretch])
+    low, high = int(table.first[stretch]) - 1, int(table.last[stretch])
     phase = (
         float(rng.uniform(low, high)) if rng.random() < 0.7 else float(rng.integers(low, high + 1))
     )

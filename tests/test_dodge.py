@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -274,6 +275,7 @@ def test_no_parts_no_graph():
 
 
 def test_settings_that_make_no_sense():
+    wrong: dict[str, Any]
     for wrong in ({"window": 0}, {"most": 8.0}, {"latency": 0}, {"body": -1}):
         with pytest.raises(ValueError, match=r"input|less|greater"):
             DodgeSettings(**wrong)
