@@ -13,7 +13,9 @@ from kumite.body.spheres import load_spheres, save_spheres
 from kumite.clip import Skeleton
 from kumite.errors import KumiteError
 from kumite.performer import skeleton as figure
-from tests import toys
+from kumite.scene import DodgeScene, load_scene
+from kumite.scene.dodge import DodgeSettings
+from tests import dodging, toys
 
 
 def surface(body, rng: np.random.Generator, count: int = 4000):
@@ -134,3 +136,18 @@ def test_spheres_that_make_no_sense():
     for thicker in (0.0, -0.1, np.nan, 2.0):
         with pytest.raises(KumiteError, match="thicker"):
             lay_spheres(toys.skeleton(), thicker=thicker)
+
+
+def test_a_scene_takes_an_edited_file(tmp_path):
+    library = dodging.few()
+    skeleton = library.clips.skeleton
+    laid = lay_spheres(skeleton)
+    path = tmp_path / "spheres.toml"
+    save_spheres(path, Spheres(laid.joint, laid.centre, laid.radius + 0.05), skeleton)
+    dodge = DodgeSettings(spheres=str(path), index=False)
+    settings = load_scene("dodgeball").model_copy(update={"dodge": dodge})
+    scene = DodgeScene(settings, library)
+    assert np.allclose(scene.search.spheres.radius, laid.radius + 0.05, atol=1e-4)
+    missing = DodgeSettings(spheres=str(tmp_path / "none.toml"), index=False)
+    with pytest.raises(KumiteError, match=r"none\.toml"):
+        missing.body_volume(skeleton)

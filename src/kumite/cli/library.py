@@ -66,9 +66,12 @@ def library_lines(library: Library) -> list[str]:
             f"{kept}{table.states} states, {table.actions} actions of {mean:.2f} s on average"
         )
         if r:
+            if r.get("level") == "avoidance":
+                where = f"an avoidance may be begun every {r['every']:g} s"
+            else:
+                where = "anywhere" if r["event"] == "none" else f"{r['event']} lift-off"
             lines.append(
-                f"{r['transitions']} transitions of {r['candidates']} candidates "
-                f"({'anywhere' if r['event'] == 'none' else r['event'] + ' lift-off'}), "
+                f"{r['transitions']} transitions of {r['candidates']} candidates ({where}), "
                 f"mean join cost {r['mean_join_cost']:.2f}, accepted below {r['threshold']:.2f}"
             )
         return lines

@@ -410,3 +410,21 @@ def likeness(
     for name, m in found.items():
         for line in m.outside():
             err.print(f"warning: {name}: {line}", markup=False, highlight=False)
+
+
+@app.command()
+def spheres(
+    library: Annotated[Path, typer.Argument(help="A library built with 'kumite build'.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The TOML file to write.")],
+) -> None:
+    """Write the spheres that stand for the body when it avoids: to edit, for [dodge] spheres."""
+    from kumite.body import lay_spheres, save_spheres
+    from kumite.files import refuse_unwritable
+    from kumite.graph import load_library
+
+    refuse_unwritable(output)
+    skeleton = load_library(library).clips.skeleton
+    laid = lay_spheres(skeleton)
+    save_spheres(output, laid, skeleton)
+    out.print(f"{len(laid)} spheres", markup=False, highlight=False)
+    out.print(f"wrote {output}", markup=False, highlight=False)

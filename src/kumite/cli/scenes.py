@@ -119,8 +119,24 @@ def run(
         _export(recording, path)
     _show_metrics(measure(recording), as_json)
     if not as_json:
+        for line in _thinking(live):
+            out.print(line, markup=False, highlight=False)
         for path in output or []:
             out.print(f"wrote {path}", markup=False, highlight=False)
+
+
+def _thinking(live: Any) -> list[str]:
+    """How long decisions took. Not in the recording: the same seed gives the same bytes."""
+    decisions = getattr(live, "decisions", [])
+    if not decisions:
+        return []
+    seconds = sorted(d.seconds for d in decisions)
+    nodes = sum(int(d.nodes.sum()) for d in decisions)
+    pruned = sum(d.pruned for d in decisions) / len(decisions)
+    return [
+        f"{len(decisions)} decisions, {nodes} nodes, {pruned:.0%} pruned; "
+        f"{1e3 * sum(seconds) / len(seconds):.1f} ms a decision, at most {1e3 * seconds[-1]:.1f} ms"
+    ]
 
 
 def _show_metrics(metrics: Any, as_json: bool) -> None:

@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from kumite.body import lay_body
+from kumite.body import Spheres, lay_body, load_spheres
+from kumite.clip import Skeleton
 from kumite.control.attack import thrown
 from kumite.control.avoidance import AvoidanceRules, AvoidanceSearch
 from kumite.errors import KumiteError
@@ -65,11 +66,16 @@ class DodgeSettings(Settings):
     clearance: Annotated[Finite, Field(ge=0, le=1)] = 0.04  # m
     most: Annotated[Finite, Field(ge=1, le=FASTEST)] = 4.0
     latency: Annotated[int, Field(ge=1, le=120)] = 1  # frames until a search is taken up
+    spheres: str | None = None  # a file of the body's volume (kumite spheres); by default laid
     index: bool = True
     culling: bool = True
     searches: bool = True  # False: they only stand about
     counters: bool = True  # where a blow has been avoided, they strike back, if they have blows
     distance: Annotated[Finite, Field(ge=0.5, le=10)] = 1.0  # m kept to whoever attacks
+
+    def body_volume(self, skeleton: Skeleton) -> Spheres | None:
+        """The body's volume, if a file says what it is. Errors: of the file."""
+        return None if self.spheres is None else load_spheres(self.spheres, skeleton)
 
     def search(self) -> AvoidanceRules:
         return AvoidanceRules(
@@ -98,7 +104,8 @@ class DodgeScene:
         self.names = tuple(d.name for d in settings.dodging)
         self.dodge = settings.dodge or DodgeSettings()
         self.balls_settings = settings.balls or BallsSettings()
-        self.search = AvoidanceSearch(library, self.dodge.search())
+        volume = self.dodge.body_volume(library.clips.skeleton)
+        self.search = AvoidanceSearch(library, self.dodge.search(), spheres=volume)
         _ = self.search.masks, self.search.index  # made now, not at the first throw
         self._streams: bool | None = None  # None: as many throws as the settings say
         self.body = lay_body(self.skeleton)

@@ -124,7 +124,9 @@ class EvasionScene:
             for name in side
         )
         self.dodge = settings.dodge or DodgeSettings()
-        self.search = AvoidanceSearch(library, replace(self.dodge.search(), horizon=HORIZON))
+        rules = replace(self.dodge.search(), horizon=HORIZON)
+        volume = self.dodge.body_volume(library.clips.skeleton)
+        self.search = AvoidanceSearch(library, rules, spheres=volume)
         _ = self.search.masks, self.search.index  # made now, not at the first blow
         self.skill = skill_of(attack, cache, progress)
         self._counters = CounterSearch(self.search) if self.dodge.counters else None
