@@ -119,7 +119,7 @@ def run(
         _export(recording, path)
     _show_metrics(measure(recording), as_json)
     if not as_json:
-        for line in _thinking(live):
+        for line in (*_thinking(live), *_avoiding(recording)):
             out.print(line, markup=False, highlight=False)
         for path in output or []:
             out.print(f"wrote {path}", markup=False, highlight=False)
@@ -136,6 +136,19 @@ def _thinking(live: Any) -> list[str]:
     return [
         f"{len(decisions)} decisions, {nodes} nodes, {pruned:.0%} pruned; "
         f"{1e3 * sum(seconds) / len(seconds):.1f} ms a decision, at most {1e3 * seconds[-1]:.1f} ms"
+    ]
+
+
+def _avoiding(recording: Any) -> list[str]:
+    """What came of what was thrown at those who avoid."""
+    kinds = [e.kind for e in recording.events]
+    found = [e.data["outcome"] for e in recording.events if e.kind == "avoidance"]
+    if not found and "throw" not in kinds:
+        return []
+    outcomes = ", ".join(f"{name} {found.count(name)}" for name in sorted(set(found)))
+    return [
+        f"{kinds.count('throw')} balls thrown; {kinds.count('avoided')} attacks avoided, "
+        f"{kinds.count('struck')} balls struck somebody; searches: {outcomes or 'none'}"
     ]
 
 
@@ -186,7 +199,11 @@ def metrics(
     """Score a recording: hits, foot skate, distances, facing, joins."""
     from kumite.scene import load_recording, measure
 
-    _show_metrics(measure(load_recording(recording)), as_json)
+    loaded = load_recording(recording)
+    _show_metrics(measure(loaded), as_json)
+    if not as_json:
+        for line in _avoiding(loaded):
+            out.print(line, markup=False, highlight=False)
 
 
 MOST_SHOWN = 40  # characters, each in a row of its own
