@@ -8,7 +8,7 @@ seen nor felt.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -34,7 +34,6 @@ from kumite.scene.stage import SceneObject
 from kumite.synthesis import Cast
 
 ANTICIPATION = 0.4  # s of a dodger's motion that an attacker foresees; then it takes it to stand
-HORIZON = 0.6  # s to which the index looks ahead: of blows, most are over before it would pay
 NEAR = 2.0  # m from a dodger within which a blow that is meant for another menaces it, too
 BOLDNESS = 1.0  # s after an avoided blow in which there is time to strike back
 SAFE = 0.25  # s between a blow back and the next blow that may come
@@ -124,9 +123,13 @@ class EvasionScene:
             for name in side
         )
         self.dodge = settings.dodge or DodgeSettings()
+<<<<<<< HEAD
         rules = replace(self.dodge.search(), horizon=HORIZON)
         volume = self.dodge.body_volume(library.clips.skeleton)
         self.search = AvoidanceSearch(library, rules, spheres=volume)
+=======
+        self.search = AvoidanceSearch(library, self.dodge.search())
+>>>>>>> 851e92c14f5284f620c6088d4fca187160be3c45
         _ = self.search.masks, self.search.index  # made now, not at the first blow
         self.skill = skill_of(attack, cache, progress)
         self._counters = CounterSearch(self.search) if self.dodge.counters else None
