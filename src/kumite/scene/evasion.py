@@ -123,13 +123,8 @@ class EvasionScene:
             for name in side
         )
         self.dodge = settings.dodge or DodgeSettings()
-<<<<<<< HEAD
-        rules = replace(self.dodge.search(), horizon=HORIZON)
         volume = self.dodge.body_volume(library.clips.skeleton)
-        self.search = AvoidanceSearch(library, rules, spheres=volume)
-=======
-        self.search = AvoidanceSearch(library, self.dodge.search())
->>>>>>> 851e92c14f5284f620c6088d4fca187160be3c45
+        self.search = AvoidanceSearch(library, self.dodge.search(), spheres=volume)
         _ = self.search.masks, self.search.index  # made now, not at the first blow
         self.skill = skill_of(attack, cache, progress)
         self._counters = CounterSearch(self.search) if self.dodge.counters else None
