@@ -33,6 +33,7 @@ class Postures(NamedTuple):
     wxyz: np.ndarray  # [R, J, 4], the root's without its heading
     root: np.ndarray  # [R, 2] m, x and z of the root
     ankle: np.ndarray  # [R, 2] m above the ground, left and right
+    curve: np.ndarray  # [R, J] constants C
 
 
 class Posture(NamedTuple):
@@ -41,6 +42,7 @@ class Posture(NamedTuple):
     wxyz: np.ndarray  # [J, 4]
     root: np.ndarray  # [2]
     ankle: np.ndarray  # [2]
+    curve: np.ndarray  # [J]
 
 
 class Locomotion(NamedTuple):
@@ -51,6 +53,7 @@ class Locomotion(NamedTuple):
     facing: np.ndarray  # [T, K, 3]
     ankle: np.ndarray  # [T, K, 2, 3]
     on_ground: np.ndarray  # [T, K, 2] bool
+    shift: np.ndarray  # [T, K, 3] planar: what who prepares goes besides, seen from where it is
 
 
 class Going(NamedTuple):
@@ -131,18 +134,26 @@ def seen_from(a, b):
 
 
 @kernel
-def fall_behind(lag, before, now, weight):
-    """Move a character's lag on by a step of the locomotion, of which it goes 1 - weight. Eq. 3, 4.
+def shifts(shift):
+    """Whether a character goes anywhere besides."""
+    return shift[0] != 0.0 or shift[1] != 0.0 or shift[2] != 0.0
+
+
+@kernel
+def fall_behind(lag, before, now, weight, shift):
+    """Move a character's lag on by a step of the locomotion, of which it goes 1 - weight (Eq. 3,
+    4), and by what it goes besides, shift [3].
 
     The step turns as much less as it gets less far.
     """
-    if weight <= 0.0:
+    if weight <= 0.0 and not shifts(shift):
         return
     x, z, yaw = seen_from(before, now)
     here = np.empty(3)
     compose(lag, before[0], before[1], before[2], here)
     go = 1.0 - weight
     compose(here, go * x, go * z, go * yaw, here)
+    compose(here, shift[0], shift[1], shift[2], here)
     # lag = here · now⁻¹
     turn = wrap(here[2] - now[2])
     c, s = np.cos(turn), np.sin(turn)
@@ -227,9 +238,9 @@ def pose_all(build, root, wxyz, position, world):
 
 
 @kernel
-def blend_pose(t, k, level, curve, moves, base, build, here, out):
+def blend_pose(t, k, level, moves, base, build, here, out):
     """Blend the rotations of a character at prepared frame ``here`` [3]; root height 0. Eq. 2."""
-    turns, loco, like = out.wxyz[t, k], moves.wxyz[t, k], base.wxyz
+    turns, loco, like, curve = out.wxyz[t, k], moves.wxyz[t, k], base.wxyz, base.curve
     known, weight = -1.0, 0.0
     for j in range(turns.shape[0]):
         if curve[j] != known:  # neighbours in the tree share theirs: powers are dear
@@ -258,20 +269,20 @@ def blend_pose(t, k, level, curve, moves, base, build, here, out):
 
 
 @kernel
-def prepare_one(t, k, level, base, curve, half_life, dt, moves, build, going, out):
+def prepare_one(t, k, level, base, half_life, dt, moves, build, going, out):
     """Frame t of character k; ``base``: the posture it prepares for (a :class:`Posture`)."""
-    weight = blend_weight(level, curve[0])
+    weight, shift = blend_weight(level, base.curve[0]), moves.shift[t, k]
     if going.begun[k]:
-        fall_behind(going.lag[k], going.facing[k], moves.facing[t, k], weight)
+        fall_behind(going.lag[k], going.facing[k], moves.facing[t, k], weight, shift)
     offset = going.offset[k]
     settled = offset[0, 0] == 0.0 and offset[0, 1] == 0.0
     settled = settled and offset[1, 0] == 0.0 and offset[1, 1] == 0.0
-    if level <= 0.0 and settled:
+    if level <= 0.0 and settled and not shifts(shift):
         go_plain(t, k, moves, build, going, out)
     else:
         lag, g, here = going.lag[k], moves.facing[t, k], out.facing[t, k]
         compose(lag, g[0], g[1], g[2], here)
-        blend_pose(t, k, level, curve, moves, base, build, here, out)
+        blend_pose(t, k, level, moves, base, build, here, out)
         place, position, world = out.root[t, k], out.position[t, k], out.world_wxyz[t, k]
         ankle = moves.ankle[t, k]
         left, right = build.legs[0, 2], build.legs[1, 2]
@@ -310,13 +321,13 @@ def prepare_one(t, k, level, base, curve, half_life, dt, moves, build, going, ou
     going.begun[k] = True
 
 
-def _prepare(level, reference, postures, curve, half_life, dt, moves, build, going, out):
-    """All frames of all characters: level [T, K], reference [K], curve [J]."""
+def _prepare(level, reference, postures, half_life, dt, moves, build, going, out):
+    """All frames of all characters: level [T, K], reference [K]."""
     for k in prange(level.shape[1]):
         r = reference[k]
-        base = Posture(postures.wxyz[r], postures.root[r], postures.ankle[r])
+        base = Posture(postures.wxyz[r], postures.root[r], postures.ankle[r], postures.curve[r])
         for t in range(level.shape[0]):
-            prepare_one(t, k, level[t, k], base, curve, half_life, dt, moves, build, going, out)
+            prepare_one(t, k, level[t, k], base, half_life, dt, moves, build, going, out)
 
 
 prepare = kernel(_prepare)

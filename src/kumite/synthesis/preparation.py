@@ -143,25 +143,38 @@ class Preparation:
         curve: np.ndarray | None = None,
         foot_half_life: float = FOOT_HALF_LIFE,
     ) -> None:
-        """curve: constants C [J], by default :func:`curves`'. Errors: shapes that do not fit."""
+        """curve: constants C [J], or [R, J] of each posture; by default :func:`curves`'.
+
+        Errors: shapes that do not fit.
+        """
         joints = len(skeleton)
         if postures.wxyz.shape[1] != joints:
             raise KumiteError(
                 f"preparation: postures of {postures.wxyz.shape[1]} joints, a skeleton of {joints}"
             )
-        self.curve = curves(skeleton) if curve is None else np.array(curve, dtype=np.float64)
-        if self.curve.shape != (joints,) or not np.all(self.curve > 0):
-            raise KumiteError(f"preparation: C must be {joints} numbers, each more than 0")
+        curve = curves(skeleton) if curve is None else np.asarray(curve, dtype=np.float64)
+        shapes = ((joints,), (len(postures), joints))
+        if curve.shape not in shapes or not np.all(curve > 0):
+            raise KumiteError(
+                f"preparation: C must be {joints} numbers, each more than 0, or so many of each of "
+                f"{len(postures)} postures"
+            )
         if not foot_half_life > 0:
             raise KumiteError(f"preparation: half-life {foot_half_life} s; expected more than 0")
         self.fps, self.foot_half_life = float(fps), float(foot_half_life)
         self.build: Build = build_of(skeleton)
-        self.postures = kernels.Postures(postures.wxyz, postures.root, postures.ankle)
+        self.postures = kernels.Postures(
+            postures.wxyz,
+            postures.root,
+            postures.ankle,
+            np.array(np.broadcast_to(curve, shapes[1])),
+        )
         self.root_position = np.zeros((count, 3))
         self.wxyz = np.zeros((count, joints, 4))
         self.position = np.zeros((count, joints, 3))
         self.world_wxyz = np.zeros((count, joints, 4))
         self.facing = np.zeros((count, 3))  # of what is shown, in the scene
+        self._straight = np.zeros((count, 3))
         self.going = kernels.Going(
             np.zeros(count, dtype=bool),
             np.zeros((count, 3)),
@@ -190,12 +203,14 @@ class Preparation:
         on_ground: np.ndarray,
         level: np.ndarray | float,
         reference: np.ndarray | int = 0,
+        shift: np.ndarray | None = None,
     ) -> None:
         """Prepare the next frame of all characters.
 
         root_position [K, 3], wxyz [K, J, 4], facing [K, 3], ankle [K, 2, 3], on_ground [K, 2]: the
-        locomotion's. level [K] in 0 … 1, reference [K] index of the posture. Errors: a level or a
-        reference out of range; shapes that do not fit.
+        locomotion's. level [K] in 0 … 1, reference [K] index of the posture. shift [K, 3] (m, m,
+        rad): what they go and turn in this frame besides, seen from where they are; feet that stand
+        stay. Errors: a level or a reference out of range; shapes that do not fit.
         """
         count = len(self.wxyz)
         levels = np.broadcast_to(checked_levels(level), (count,))
@@ -206,6 +221,7 @@ class Preparation:
             _one(facing, (count, 3)),
             _one(ankle, (count, 2, 3)),
             _one(on_ground, (count, 2), np.bool_),
+            _one(self._straight if shift is None else shift, (count, 3)),
         )
         shown = kernels.Prepared(
             self.root_position[None],
@@ -217,12 +233,16 @@ class Preparation:
         self._run(np.ascontiguousarray(levels)[None], like, moves, shown)
 
     def show_cast(
-        self, cast: Cast, level: np.ndarray | float, reference: np.ndarray | int = 0
+        self,
+        cast: Cast,
+        level: np.ndarray | float,
+        reference: np.ndarray | int = 0,
+        shift: np.ndarray | None = None,
     ) -> None:
         """:meth:`show` of what a cast shows."""
         ankle = cast.position[:, self.build.legs[:, 2]]
         self.show(
-            cast.root_position, cast.wxyz, cast.facing, ankle, cast.contacts, level, reference
+            cast.root_position, cast.wxyz, cast.facing, ankle, cast.contacts, level, reference, shift
         )
 
     def _run(self, level, reference, moves, shown) -> None:
@@ -231,7 +251,6 @@ class Preparation:
             level,
             reference,
             self.postures,
-            self.curve,
             self.foot_half_life,
             1.0 / self.fps,
             moves,
@@ -281,7 +300,7 @@ def prepare_clip(
     facing = facing_frame(skeleton, clip.root_position, clip.wxyz)
     ankle = np.ascontiguousarray(position[:, work.build.legs[:, 2]])
     parts = (clip.root_position, clip.wxyz, facing, ankle, on_ground)
-    moves = kernels.Locomotion(*(a[:, None] for a in parts))
+    moves = kernels.Locomotion(*(a[:, None] for a in parts), np.zeros((frames, 1, 3)))
     joints = len(skeleton)
     shapes = [(3,), (joints, 4), (joints, 3), (joints, 4), (3,)]
     shown = kernels.Prepared(*(np.zeros((frames, 1, *shape)) for shape in shapes))
