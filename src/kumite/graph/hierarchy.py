@@ -316,3 +316,29 @@ def _as_table(
         planar_compose(planar_inverse(clips.facing[first - 1]), clips.facing[last]),
     )
     return table, np.array([stretches[p] for p in pieces], dtype=np.int32)
+
+
+def ways_into_cores(table: ActionTable, what: np.ndarray, cores: int) -> np.ndarray:
+    """The stretch [S, M] that leads from each state soonest into each core, by way of no target.
+
+    what [L]: as :func:`hierarchy_table` tells; -1 where there is no way.
+    """
+    states = table.states
+    source = np.repeat(np.arange(states), np.diff(table.action_start))
+    open_ = what[table.stretch] < cores
+    source, stretch = source[open_], table.stretch[open_]
+    frames = (table.last - table.first + 1)[stretch].astype(float)
+    out = np.full((states, cores), -1, dtype=np.int64)
+    for m in range(cores):
+        there = what[stretch] == m
+        left = np.full(states, np.inf)  # frames until the core is entered
+        while True:
+            cost = np.where(there, 0.0, frames + left[table.target[stretch]])
+            best = np.full(states, np.inf)
+            np.minimum.at(best, source, cost)
+            if np.array_equal(best, left):
+                break
+            left = best
+        for a in np.flatnonzero(np.isfinite(cost) & (cost == left[source]))[::-1].tolist():
+            out[source[a], m] = stretch[a]
+    return out
