@@ -12,6 +12,7 @@ from kumite.errors import KumiteError
 
 if TYPE_CHECKING:
     from kumite.graph import Library
+    from kumite.graph.preparing import Preparing
 
 ENDING = ".kumite"
 
@@ -33,6 +34,8 @@ def library_values(library: Library) -> dict[str, Any]:
         "clips": len(clips.names),
         "avoidance_parts": len(library.avoidance),
     }
+    if library.preparing is not None:
+        values["target_motions"] = _target_values(library.preparing)
     if library.actions is not None:
         ways = np.diff(library.table.action_start)
         values["ways_on"] = {
@@ -59,6 +62,8 @@ def library_lines(library: Library) -> list[str]:
             f"{len(library.avoidance)} avoidance parts of {mean:.2f} s on average, "
             f"{held} of them connected, each within one action"
         )
+    if library.preparing is not None:
+        return lines + _preparation_lines(library)
     if library.actions is None:
         mean = table.duration[table.stretch].mean() / clips.fps
         kept = f"{r['frames_kept']} frames connected, {r['hits_kept']} blows in them: " if r else ""
@@ -89,6 +94,71 @@ def library_lines(library: Library) -> list[str]:
     if len(joined):
         lines.append(f"mean join cost {joined.mean():.2f} rad")
     return lines
+
+
+def _preparation_lines(library: Library) -> list[str]:
+    """Cores with the pace of each, then a target a line: what it is about, and where."""
+    from kumite.clip import LIMBS
+    from kumite.graph.preparing import KINDS, NO_LIMB
+
+    preparing, table = library.preparing, library.table
+    if preparing is None:
+        return []
+    fps, cores, targets = library.clips.fps, preparing.hierarchy.cores, preparing.hierarchy.targets
+    kept = len(np.unique(np.concatenate([np.arange(a, b + 1) for a, b in _ranges(library)])))
+    lines = [
+        f"{kept} frames connected: {table.states} states, {table.actions} actions of "
+        f"{table.duration[table.stretch].mean() / fps:.2f} s on average",
+        f"{len(cores)} cores: "
+        + ", ".join(f"{name} {v:.2f} m/s" for name, v in zip(cores.label, cores.speed)),
+        f"{len(targets)} target motions:",
+    ]
+    for t, label in enumerate(targets.label):
+        kind, limb, clear = KINDS[preparing.kind[t]], int(preparing.limb[t]), preparing.clear[t]
+        x, y, z = preparing.place[t]
+        about = {
+            "strike": f"strikes with the {LIMBS[limb].replace('_', ' ')}"
+            if limb != NO_LIMB
+            else "",
+            "under": f"gets under a bar {clear:.2f} m high",
+            "over": f"gets over a hurdle {clear:.2f} m high",
+        }[kind]
+        height = f", {y:.2f} m high" if kind == "strike" else ""
+        lines.append(
+            f"{label}: {about}, {np.hypot(x, z):.2f} m from its start{height}, "
+            f"{(preparing.contact[t] - targets.start[t]) / fps:.2f} s after it"
+        )
+        if not preparing.found[t]:
+            lines.append(f"{label}: no frame fits, its first frame is taken")
+    return lines
+
+
+def _target_values(preparing: Preparing) -> list[dict[str, Any]]:
+    from kumite.clip import LIMBS
+    from kumite.graph.preparing import KINDS, NO_LIMB
+
+    targets = preparing.hierarchy.targets
+    return [
+        {
+            "label": label,
+            "kind": KINDS[preparing.kind[t]],
+            "limb": None if preparing.limb[t] == NO_LIMB else LIMBS[preparing.limb[t]],
+            "start": int(targets.start[t]),
+            "stop": int(targets.stop[t]),
+            "mark": int(targets.mark[t]),
+            "reference": int(preparing.reference[t]),
+            "found": bool(preparing.found[t]),
+            "contact": int(preparing.contact[t]),
+            "place": [round(v, 4) for v in preparing.place[t].tolist()],
+            "clear": round(float(preparing.clear[t]), 4),
+            "way": round(float(preparing.way[t]), 4),
+        }
+        for t, label in enumerate(targets.label)
+    ]
+
+
+def _ranges(library: Library) -> list[tuple[int, int]]:
+    return list(zip(library.table.first.tolist(), library.table.last.tolist()))
 
 
 def show_library(path: Path | str, plot: Path | None, as_json: bool, given: list[str]) -> None:

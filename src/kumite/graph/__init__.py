@@ -3,6 +3,7 @@
 from kumite.graph.avoiding import build_avoidance_library, find_avoiding_transitions
 from kumite.graph.builtin import builtin_library
 from kumite.graph.distance import PoseFeatures, pose_features
+from kumite.graph.errands import build_preparation_library
 from kumite.graph.hierarchy import (
     Hierarchy,
     Targets,
@@ -11,6 +12,7 @@ from kumite.graph.hierarchy import (
     hierarchy_table,
 )
 from kumite.graph.library import Library, build_library, load_library, save_library
+from kumite.graph.preparing import Preparing
 from kumite.graph.table import ActionTable, fold
 from kumite.graph.transitions import Transitions, find_transitions, strongest_component
 from kumite.graph.whole import build_action_library
@@ -20,6 +22,7 @@ __all__ = [
     "Hierarchy",
     "Library",
     "PoseFeatures",
+    "Preparing",
     "Targets",
     "Transitions",
     "authored_targets",
@@ -27,6 +30,7 @@ __all__ = [
     "build_avoidance_library",
     "build_hierarchy",
     "build_library",
+    "build_preparation_library",
     "builtin_library",
     "find_avoiding_transitions",
     "find_transitions",

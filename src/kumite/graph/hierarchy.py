@@ -137,20 +137,22 @@ def build_hierarchy(
     *,
     alike: float = ALIKE,
     features: PoseFeatures | None = None,
+    latest: np.ndarray | None = None,
+    earliest: np.ndarray | None = None,
 ) -> Hierarchy:
     """How cores and targets hang together.
 
     A join goes to where poses are least apart, over all frames of a core's cycle and over the
-    frames within ``ENTRY`` of a target's start (before its mark) and within ``RETURN`` of its stop.
-    Errors: frames of a target that are no part of one clip; no cores.
+    frames within ``ENTRY`` of a target's start (up to its mark, or frame ``latest`` [T] from start
+    to mark) and within ``RETURN`` of its stop (after its mark, or from frame ``earliest`` [T] up to
+    stop on). Errors: frames of a target that are no part of one clip; no cores.
     """
     if len(cores) == 0:
         raise KumiteError("hierarchy: no core motions; expected at least one cycle")
+    check_targets(clips, targets)
     clip = clips.clip_of_frame
-    for t, label in enumerate(targets.label):
-        a, b = int(targets.start[t]), int(targets.stop[t])
-        if not (a >= 0 and b < len(clips) and clip[a] == clip[b]):
-            raise KumiteError(f"target {label!r}: frames {a} to {b} are no part of one clip")
+    latest = targets.mark if latest is None else latest
+    earliest = targets.mark + 1 if earliest is None else np.minimum(earliest, targets.stop)
     features = features or pose_features(clips)
     m, count = len(cores), len(targets)
     leave, entry, exit_, land = (np.zeros((m, count), dtype=np.int64) for _ in range(4))
@@ -158,11 +160,11 @@ def build_hierarchy(
     frames = [np.arange(a + 1, b + 1) for a, b in zip(cores.start, cores.stop)]
     for t in range(count):
         first, last = (int(f) for f in clips.clip_start[clip[targets.start[t]] :][:2])
-        start, stop, mark = (int(x[t]) for x in (targets.start, targets.stop, targets.mark))
+        start, stop = int(targets.start[t]), int(targets.stop[t])
         slack = round(ENTRY * clips.fps)
-        starts = np.arange(max(start - slack, first), min(start + slack, mark) + 1)
+        starts = np.arange(max(start - slack, first), min(start + slack, latest[t]) + 1)
         slack = round(RETURN * clips.fps)
-        stops = np.arange(max(stop - slack, mark + 1), min(stop + slack, last - 1) + 1)
+        stops = np.arange(max(stop - slack, earliest[t]), min(stop + slack, last - 1) + 1)
         for c in range(m):
             i, j, entry_distance[c, t] = _nearest(features, frames[c], starts)
             leave[c, t], entry[c, t] = frames[c][i], starts[j]
@@ -185,6 +187,15 @@ def build_hierarchy(
         links[4],
         alike,
     )
+
+
+def check_targets(clips: ClipSet, targets: Targets) -> None:
+    """Errors: frames of a target that are no part of one clip."""
+    clip = clips.clip_of_frame
+    for t, label in enumerate(targets.label):
+        a, b = int(targets.start[t]), int(targets.stop[t])
+        if not (a >= 0 and b < len(clips) and clip[a] == clip[b]):
+            raise KumiteError(f"target {label!r}: frames {a} to {b} are no part of one clip")
 
 
 def pose_distances(features: PoseFeatures, a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ from kumite.annotate import (
     Actions,
     AvoidanceParts,
     Contacts,
+    Cycles,
     Strikes,
     find_avoidance,
     find_contacts,
@@ -25,6 +26,8 @@ from kumite.annotate import (
 from kumite.clip import ClipSet, Skeleton
 from kumite.errors import KumiteError
 from kumite.graph.distance import pose_features
+from kumite.graph.hierarchy import Hierarchy, Targets
+from kumite.graph.preparing import Preparing
 from kumite.graph.table import ActionTable, fold
 from kumite.graph.transitions import (
     LARGEST_SHARE,
@@ -35,7 +38,7 @@ from kumite.graph.transitions import (
 )
 
 KIND = "library"
-VERSION = 4
+VERSION = 5
 
 _NO_PARTS = no_avoidance(np.zeros(1, np.int64))  # of clips that are not known yet
 
@@ -51,6 +54,7 @@ class Library:
     report: dict[str, Any] = field(default_factory=dict)  # how it was built, JSON values
     actions: Actions | None = None  # what the stretches of an action-level graph are
     avoidance: AvoidanceParts = _NO_PARTS  # kept whole in the graph; none unless it was asked for
+    preparing: Preparing | None = None  # what a hierarchical graph is made of
 
     def __post_init__(self) -> None:
         frames = len(self.clips)
@@ -73,6 +77,8 @@ class Library:
                 raise KumiteError("library: its actions are of other clips")
             if np.any(self.actions.stop[self.action_of_stretch] - 1 != last):
                 raise KumiteError("library: a stretch is not an action")
+        if self.preparing is not None:
+            self.preparing.check(self.clips, len(self.table.first))
 
     @property
     def action_of_stretch(self) -> np.ndarray:
@@ -98,6 +104,8 @@ class Library:
         h = hashlib.sha256(f"{VERSION}{self.clips.fps}{self.clips.skeleton.names}".encode())
         for array in _arrays(self).values():
             h.update(np.ascontiguousarray(array).tobytes())
+        if self.preparing is not None:
+            h.update(str(_preparing_header(self.preparing)).encode())
         return h.hexdigest()[:16]
 
 
@@ -217,6 +225,7 @@ def _arrays(library: Library) -> dict[str, np.ndarray]:
         "avoidance.start": library.avoidance.start,
         "avoidance.stop": library.avoidance.stop,
         **({} if library.actions is None else _action_arrays(library.actions)),
+        **({} if library.preparing is None else _preparing_arrays(library.preparing)),
     }
 
 
@@ -224,6 +233,36 @@ def _action_arrays(actions: Actions) -> dict[str, np.ndarray]:
     group = _group("actions", actions)
     del group["actions.label"], group["actions.clip_start"]  # a header's, and the clips'
     return group
+
+
+def _preparing_arrays(preparing: Preparing) -> dict[str, np.ndarray]:
+    h = preparing.hierarchy
+    group = {
+        **_group("preparing", preparing),
+        **_group("hierarchy", h),
+        **_group("cores", h.cores),
+        **_group("targets", h.targets),
+    }
+    of_a_header = ("cores.label", "cores.fps", "targets.label", "hierarchy.alike")
+    records = ("preparing.hierarchy", "hierarchy.cores", "hierarchy.targets")
+    return {name: a for name, a in group.items() if name not in (*of_a_header, *records)}
+
+
+def _preparing_header(preparing: Preparing) -> dict[str, Any]:
+    h = preparing.hierarchy
+    return {"cores": list(h.cores.label), "targets": list(h.targets.label), "alike": h.alike}
+
+
+def _preparing(header: Any, part: Callable[[str], dict[str, Any]], fps: float) -> Preparing:
+    return Preparing(
+        Hierarchy(
+            cores=Cycles(label=tuple(header["cores"]), fps=fps, **part("cores")),
+            targets=Targets(label=tuple(header["targets"]), **part("targets")),
+            alike=float(header["alike"]),
+            **part("hierarchy"),
+        ),
+        **part("preparing"),
+    )
 
 
 def save_library(path: Path | str, library: Library) -> None:
@@ -234,6 +273,7 @@ def save_library(path: Path | str, library: Library) -> None:
         "roles": dict(library.clips.skeleton.roles),
         "report": library.report,
         "labels": None if library.actions is None else list(library.actions.label),
+        "preparing": None if library.preparing is None else _preparing_header(library.preparing),
     }
     files.save(path, KIND, VERSION, header, _arrays(library))
 
@@ -268,6 +308,9 @@ def load_library(path: Path | str) -> Library:
                 label=tuple(header["labels"]), clip_start=clips.clip_start, **part("actions")
             ),
             AvoidanceParts(clip_start=clips.clip_start, **part("avoidance")),
+            None
+            if header["preparing"] is None
+            else _preparing(header["preparing"], part, clips.fps),
         )
     except (KeyError, TypeError, ValueError, KumiteError) as error:
         raise KumiteError(f"{path}: damaged library ({error})") from None
