@@ -20,7 +20,6 @@ from kumite.graph import Library
 from kumite.graph.hierarchy import ways_into_cores
 from kumite.rotation import wrap_angle
 
-FASTEST_TURN = 1.5  # rad/s
 SHORTEST_TURN = 0.5  # s in which a turn is made near the place, where steps are short
 ASIDE = 0.6  # of the distance to the place: so far behind it lies what is steered for
 
@@ -50,18 +49,6 @@ class Guide:
         cores = len(preparing.hierarchy.cores)
         return ways_into_cores(self.library.table, preparing.what, cores)
 
-    @cached_property
-    def half_steer(self) -> float:
-        """Half of what the turns differ that may be chosen [rad]: what is between them is played
-        as it is needed."""
-        steer = np.unique(self.approach.steer)
-        return 0.5 * float(np.diff(steer).min()) if len(steer) > 1 else 0.0
-
-    def row_of(self, core: int) -> int:
-        """The motion that plays a core straight on."""
-        rows = np.flatnonzero(self.approach.core == core)
-        return int(rows[np.argmin(np.abs(self.approach.steer[rows]))])
-
     def choose(
         self,
         row: np.ndarray,
@@ -76,15 +63,16 @@ class Guide:
     def turn(
         self, row: np.ndarray, bearing: np.ndarray, near: np.ndarray, alpha: np.ndarray
     ) -> np.ndarray:
-        """How fast [rad/s] to turn towards what is seen at ``bearing`` [rad]: as the motion says,
-        and as needed between one that may be chosen and the next; near the place, freely. Who is
+        """How fast [rad/s] to turn towards what is seen at ``bearing`` [rad].
+
+        The motions of an approach turn by a few angles; what is played turns by what is needed, in
+        the time of the motion and at most by the largest of these; sooner near the place. Who is
         prepared turns as much less as the way gets shorter (alpha: 0 to 1).
         """
-        steer, half = self.approach.steer[row], self.half_steer
-        seconds = np.where(near, SHORTEST_TURN, self.approach.motions.duration[row])
-        by = np.where(near, bearing, np.clip(bearing, steer - half, steer + half))
-        moves = self.moves[row]
-        return np.where(moves, np.clip(by / seconds, -FASTEST_TURN, FASTEST_TURN), 0) * (1 - alpha)
+        most = np.abs(self.approach.steer).max()
+        seconds = self.approach.motions.duration[row]
+        rate = np.clip(bearing / np.where(near, SHORTEST_TURN, seconds), -most / seconds, most / seconds)
+        return np.where(self.moves[row], rate, 0.0) * (1.0 - alpha)
 
     @cached_property
     def moves(self) -> np.ndarray:

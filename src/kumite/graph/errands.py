@@ -89,6 +89,7 @@ def build_preparation_library(
         np.array([a.place for a in about]),
         np.array([a.clear for a in about]),
         np.array([a.way for a in about]),
+        np.array([a.past for a in about]),
     )
     kept = np.zeros(len(clips), dtype=bool)
     for first, last in zip(table.first.tolist(), table.last.tolist()):

@@ -57,6 +57,7 @@ class Preparing:
     # highest or lowest point then. Strikes: 0.
     clear: np.ndarray  # [T] m
     way: np.ndarray  # [T] rad to the left of where the start faces: the way that it goes
+    past: np.ndarray  # [T] int64, frame from which on the object is left behind
 
     def __post_init__(self) -> None:
         cores, count = len(self.hierarchy.cores), len(self.hierarchy.targets)
@@ -67,7 +68,7 @@ class Preparing:
         freeze(self, "preparing", found=(np.bool_, (count,)))
         for name in ("kind", "limb"):
             freeze(self, "preparing", **{name: (np.int32, (count,))})
-        for name in ("reference", "contact"):
+        for name in ("reference", "contact", "past"):
             freeze(self, "preparing", **{name: (np.int64, (count,))})
         freeze(self, "preparing", place=(float, (count, 3)), clear=(float, (count,)))
         freeze(self, "preparing", way=(float, (count,)))
@@ -97,7 +98,7 @@ class Preparing:
                 "target",
                 targets.label,
                 targets.start,
-                (targets.stop, h.entry.T, h.exit.T, self.reference, self.contact),
+                (targets.stop, h.entry.T, h.exit.T, self.reference, self.contact, self.past),
             ),
         )
         frames = (h.link_leave, h.link_first, h.link_last, cores.start, targets.start)

@@ -6,15 +6,15 @@ plays, and a :class:`Guide` chooses. Who, where and what for, the scene says ane
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from kumite.clip import SIDES, ClipSet
 from kumite.control.guide import Guide, seen, steered_for
 from kumite.errors import KumiteError
 from kumite.rotation import (
     angle,
-    conjugate,
     from_yaw,
     multiply,
     planar_apply,
@@ -31,11 +31,17 @@ NOTHING = -1  # what somebody prepares for who prepares for nothing
 CLOSE = 0.10  # m from its place: near enough for the motion that is done there
 OFF, ASKEW = 0.35, np.radians(30)  # m and rad that a target motion may be bent to fit, at most
 PATIENCE = 0.4  # s without getting nearer to its place, then it must do
+SLOW = 0.2  # m/s: a core that is no faster stands
 NEAR = 0.6  # m within which it may turn freely
+AWRY = np.radians(75)  # so far off its heading near its place, it has missed it …
+FAR_ENOUGH = 1.3  # m … and first goes so far away
 ARRIVED = 0.8  # m from a place where nothing is to be done: there a walk is ended
 KEEP = 2.5  # m to the next place: nearer, and the style is kept up until then
 POSTURE_HALF_LIFE = 0.12  # s in which one reference posture becomes another
 READY = 0.5  # level from which on a target motion is begun at its reference posture
+WHOLE = 0.8  # of a cycle after which it counts as done: it is entered anywhere
+UNSEEN = 0.01  # level below which nobody sees what posture is prepared for
+ALIKE = 1e-3  # of a quaternion, or m: postures nearer to each other are the same
 
 
 class Walkers:
@@ -80,21 +86,28 @@ class Walkers:
         self.level = np.zeros(count)  # chosen
         self.alpha = np.zeros(count)  # shown
         self.heeds = np.ones(count, dtype=bool)  # comes to rest at its place by itself
-        self._since = np.zeros(count, dtype=np.int64)  # frames of the motion done
-        self._heed_now = np.zeros(count, dtype=bool)  # something has changed: decide at once
+        self._stretch = np.full(count, NOTHING)  # of the table, played; or part of one
+        self._since = np.zeros(count, dtype=np.int64)  # frames of the motion chosen
+        self._heed_now = np.ones(count, dtype=bool)  # something has changed: decide at once
         self._nearest = np.full(count, np.inf)  # m to its place, so far
         self._waited = np.zeros(count, dtype=np.int64)  # frames since
         self._object = np.zeros((count, 3))  # of the target motion done
         self._way = np.full(count, np.nan)  # heading that it is to have at contact
         self._span = np.zeros((count, 2), dtype=np.int64)  # frames first and contact
+        self._earlies: dict[tuple[int, int], tuple[int, int, int]] = {}
         cores = preparing.hierarchy.cores
+        self._goes = np.abs(cores.speed) > SLOW
         self._stand = int(np.argmin(np.abs(cores.speed)))
-        self.row = np.full(count, guide.row_of(self._stand))
+        self.row = np.zeros(count, dtype=np.int64)  # the motion chosen, of the approach
+        self.stands = np.ones(count, dtype=bool)  # or rather stays where it is
+        self._passed = np.zeros(count, dtype=bool)  # has got past its place: first gets away
+        states, links = library.table.state_frame, preparing.hierarchy
+        out = np.searchsorted(states, links.link_leave[self._stand])
+        self._leave_stand = np.where(links.links[self._stand], out, NOTHING)
         self._cycle = np.maximum(1, np.round(cores.seconds * self.fps).astype(np.int64))
-        table = library.table
-        begins = np.flatnonzero(np.isin(table.state_frame, cores.stop[self._stand]))
+        begins = int(np.searchsorted(states, cores.stop[self._stand]))
         for k, home in enumerate(homes):
-            self.cast.place(k, int(begins[0]), home)
+            self.cast.place(k, begins, home)
         self.cast.show(0.0)
         for k, home in enumerate(homes):
             self.shown.place(k, self.cast.facing[k], home)
@@ -102,6 +115,7 @@ class Walkers:
         self._settled = np.ones(count, dtype=bool)
         self.shown.show_cast(self.cast, self.alpha, np.arange(count))
         self._before = (self.shown.root_position.copy(), self.shown.wxyz.copy())
+        self._settled[:] = False
 
     @property
     def facing(self) -> np.ndarray:
@@ -133,7 +147,10 @@ class Walkers:
         frame = self.begins_at(t)
         p = self.place_from(t, frame)
         way = place[:, [0, 2]] - here[:, :2]
-        heading = np.arctan2(way[:, 0], way[:, 1]) - np.arctan2(p[:, 0], p[:, 2])
+        away = np.maximum(np.hypot(way[:, 0], way[:, 1]), 1e-9)
+        # Straight on from here, the object comes to be as far aside as it is to be.
+        aside = np.arcsin(np.clip(p[:, 0] / away, -1.0, 1.0))
+        heading = np.arctan2(way[:, 0], way[:, 1]) - aside
         clips = self.library.clips
         turned = clips.facing[frame, 2] - clips.facing[self.preparing.hierarchy.targets.start[t], 2]
         through = normal - self.preparing.way[t] + turned
@@ -180,31 +197,27 @@ class Walkers:
         mark, the motion is most like what is shown.
         """
         p, clips, cast = self.preparing, self.library.clips, self.cast
-        h = p.hierarchy
-        now = Moment.between(
-            np.stack([self._before[0][k], self.shown.root_position[k]]),
-            np.stack([self._before[1][k], self.shown.wxyz[k]]),
-            self.fps,
-        )
+        h, now = p.hierarchy, self._moment(k)
         first, apart = self._best_beginning(k, t)
         core = int(np.argmin(np.where(h.returns[:, t], h.exit_distance[:, t], np.inf)))
         cast.adopt(k, first, int(h.exit[core, t]), now)
         self.shown.place(k, cast.facing[k], cast.facing[k])
-        self.doing[k], self._heed_now[k] = t, False
+        self.doing[k], self._heed_now[k], self._stretch[k] = t, False, NOTHING
         self.filter.restart(k, 0.0)
         self._span[k] = first, p.contact[t]
-        self._object[k] = np.nan if place is None else place
-        start = clips.facing[h.targets.start[t], 2]
-        way = normal - p.way[t] - start  # the anchor's turn that would have it
-        self._way[k] = way
+        start = clips.facing[h.targets.start[t]]
+        there = planar_apply(planar_compose(cast.anchor[k], start), p.place[t])
+        bent = place is not None and np.hypot(*(place - there)[[0, 2]]) <= OFF
+        self._object[k] = place if bent else np.nan
+        self._way[k] = normal - p.way[t] - start[2] if bent else np.nan
         self.event(
             "launch",
             k,
-            motion=h.targets.label[t],
+            motion=self._label(t),
             level=round(float(self.alpha[k]), 4),
-            apart=round(apart, 4),
+            apart_deg=round(float(np.degrees(apart)), 3),
             to_contact=round((int(p.contact[t]) - first) / self.fps, 4),
-            turned=round(float(np.linalg.norm(now.joint_velocity)), 3),
+            bent=None if place is None else round(float(np.hypot(*(place - there)[[0, 2]])), 4),
         )
 
     def _best_beginning(self, k: int, t: int) -> tuple[int, float]:
@@ -215,11 +228,9 @@ class Walkers:
             frames = np.array([p.reference[t]])
         else:
             frames = np.arange(int(h.entry[:, t].min()), int(h.targets.mark[t]) + 1)
-        mine = self.shown.wxyz[k].copy()
-        mine[0] = multiply(from_yaw(-self.facing[k, 2]), mine[0])
-        theirs = clips.wxyz[frames].copy()
-        theirs[:, 0] = multiply(from_yaw(-clips.facing[frames, 2]), theirs[:, 0])
-        apart = np.sqrt(np.mean(angle(theirs, mine[None]) ** 2, axis=1))
+        mine = headless(self.shown.wxyz[k][None], self.facing[k, 2][None])
+        theirs = headless(clips.wxyz[frames], clips.facing[frames, 2])
+        apart = np.sqrt(np.mean(angle(theirs, mine) ** 2, axis=1))
         best = int(np.argmin(apart))
         return int(frames[best]), float(apart[best])
 
@@ -229,39 +240,205 @@ class Walkers:
         """Everyone one frame on."""
         cast, guide = self.cast, self.guide
         self._before = (self.shown.root_position.copy(), self.shown.wxyz.copy())
+        self._leave_early()
         self._choose(cast.waiting)
         cast.advance()
         busy = self.doing != ON_THE_WAY
         smooth = self.filter.push(np.where(busy, 0.0, self.level))
         off, _ = self.off()
         bearing = seen(self.facing, steered_for(self.facing, self.goal))[1]
-        rests = self.heeds & (self.wants != NOTHING) & ~busy & (np.abs(bearing) < 0.5 * np.pi)
         self.alpha = np.where(busy, 0.0, smooth)
-        if self.prepares:
-            self.alpha = np.where(rests, np.maximum(smooth, guide.settle(off)), self.alpha)
-        near = off < NEAR
         askew = np.nan_to_num(wrap_angle(self.goal[:, 2] - self.facing[:, 2]))
-        square = np.clip(1.0 - off / NEAR, 0.0, 1.0) * ~np.isnan(self.goal[:, 2])
-        turn = guide.turn(self.row, (1 - square) * bearing + square * askew, near, self.alpha)
-        shift = np.zeros((len(off), 3))
+        turned = (np.abs(askew) > AWRY) & (self.wants != NOTHING)
+        self._passed = ~busy & (off < FAR_ENOUGH) & (self._passed | ((off < NEAR) & turned))
+        bearing = np.where(self._passed, 0.0, bearing)
+        if self.prepares:
+            before = (np.abs(bearing) < 0.5 * np.pi) | (off < OFF)  # its place, or at it
+            rests = before & ~self._passed & self.heeds & (self.wants != NOTHING) & ~busy
+            self.alpha = np.where(rests, np.maximum(smooth, guide.settle(off)), self.alpha)
+        headed = ~np.isnan(self.goal[:, 2])
+        square = np.where(headed & ~self._passed, np.clip(1.0 - off / NEAR, 0.0, 1.0), 0.0)
+        turn = guide.turn(
+            self.row, (1.0 - square) * bearing + square * askew, off < NEAR, self.alpha
+        )
+        shift = np.zeros((cast.count, 3))
         shift[:, 2] = np.where(busy, 0.0, turn / self.fps)
-        self._meet(shift)
+        self._meet(np.flatnonzero(busy & np.isfinite(self._object[:, 0])), shift)
         self._lead()
-        self.shown.show_cast(cast, self.alpha, np.arange(len(off)), shift)
+        self.shown.show_cast(cast, self.alpha, np.arange(cast.count), shift)
 
     def _choose(self, who: np.ndarray) -> None:
         """Those at the end of what they play take what comes next."""
+        cast, guide, table = self.cast, self.guide, self.library.table
+        plays = np.where(self._stretch >= 0, self.preparing.what[self._stretch], NOTHING)
+        # Who stands does not wait for the end of a cycle: all its poses are much alike.
+        bored = self._heed_now & (plays == self._stand)
+        who = np.union1d(who, np.flatnonzero(bored))
         if len(who) == 0:
             return
-        cast, guide, preparing = self.cast, self.guide, self.preparing
-        self._end_targets(who)
-        played = self._core_of_frame[cast.stop[who]]
-        core = guide.approach.core[self.row[who]]
-        self._since[who] += np.where(played == core, self._frames_played(who), 0)
-        due = self._heed_now[who] | ((played == core) & (self._since[who] >= 0.8 * self._cycle[core]))
+        ended = who[self.doing[who] != ON_THE_WAY]
+        if len(ended):
+            self._return(ended, 0.0)
+        plays, core = plays[who], self._core(who)
+        frames = (table.last - table.first + 1)[self._stretch[who]]
+        self._since[who] += np.where(plays == core, frames, 0)
+        due = self._heed_now[who] | (self._since[who] >= WHOLE * self._cycle[core])
         if np.any(due):
             self._decide(who[due])
-        state = np.searchsorted(self.library.table.state_frame, cast.stop[who])
-        stretch = np.zeros(cast.count, dtype=np.int64)
-        stretch[who] = guide.onward[state, guide.approach.core[self.row[who]]]
-        cast.begin(who, stretch)
+        core = self._core(who)
+        state = np.searchsorted(table.state_frame, cast.stop[who])
+        leaves = bored[who] & (core != self._stand) & (self._leave_stand[core] >= 0)
+        state = np.where(leaves, self._leave_stand[core], state)
+        self._stretch[who] = guide.onward[state, core]
+        cast.begin(who, self._stretch)
+
+    def _core(self, who: np.ndarray) -> np.ndarray:
+        """The cores that characters mean to play."""
+        chosen = self.guide.approach.core[self.row[who]]
+        return np.where(self.stands[who], self._stand, chosen)
+
+    def _decide(self, who: np.ndarray) -> None:
+        """The motion and the level of preparation that the controller chooses."""
+        facing, goal, guide = self.facing[who], self.goal[who], self.guide
+        nothing = self.wants[who] == NOTHING
+        away, _ = seen(facing, goal[:, :2])
+        _, bearing = seen(facing, steered_for(facing, goal))
+        far, aside = seen(facing, self.source[who])
+        far = np.where(nothing, guide.policy.settings.farthest, far)
+        self.row[who], level = guide.choose(
+            self.row[who], self.level[who], (away, bearing), (far, np.where(nothing, np.pi, aside))
+        )
+        self.stands[who] = nothing & (away < ARRIVED)
+        unprepared = nothing | self._passed[who] | (not self.prepares)
+        self.level[who] = np.where(unprepared, 0.0, level)
+        self._since[who] = 0
+        # Who stands goes on looking out for something to do.
+        self._heed_now[who] = False
+
+    def _return(self, who: np.ndarray, level: float) -> None:
+        """Characters have done their target motions, and are prepared to a level for the next."""
+        for k in who.tolist():
+            self.event("done", k, motion=self._label(int(self.doing[k])))
+        self.doing[who], self.level[who] = ON_THE_WAY, level
+        self._stretch[who] = NOTHING
+        self.decide_anew(who)
+
+    def _leave_early(self) -> None:
+        """Who has another target motion to do close by leaves this one where it is most like the
+        posture for the next, and stays in that style (section 7)."""
+        if not self.prepares:
+            return
+        soon = (self.doing != ON_THE_WAY) & (self.wants != NOTHING)
+        for k in np.flatnonzero(soon).tolist():
+            t, then = int(self.doing[k]), int(self.wants[k])
+            if self.off()[0][k] > KEEP:
+                continue
+            frame, land, stop = self._early(t, then)
+            if self.cast.frame[k] < frame:
+                continue
+            if self.cast.frame[k] > frame + 2:
+                continue
+            self.cast.adopt(k, land, stop, self._moment(k))
+            self.shown.place(k, self.cast.facing[k], self.cast.facing[k])
+            self._return(np.array([k]), 1.0)
+            self._posture_of[k], self._settled[k] = then, False
+            self._lead(at_once=np.array([k]))
+
+    def _early(self, t: int, then: int) -> tuple[int, int, int]:
+        """Of target t, when ``then`` comes soon: the frame to leave it at, the frame of a walk to go
+        on from, and where that comes to a state."""
+        if (t, then) in self._earlies:
+            return self._earlies[t, then]
+        p, clips = self.preparing, self.library.clips
+        h, table = p.hierarchy, self.library.table
+        frames = np.arange(int(p.past[t]), int(h.exit[:, t].max()) + 1)
+        apart = pose_angles(clips, frames, p.reference[then : then + 1])[:, 0]
+        frame = int(frames[np.argmin(apart)])
+        walk = int(np.argmin(np.where(self._goes, h.exit_distance[:, t], np.inf)))
+        cores = h.cores
+        cycle = np.arange(cores.start[walk] + 1, cores.stop[walk])
+        legs = [clips.skeleton.joint(f"{s}_{x}") for s in SIDES for x in ("thigh", "shin", "foot")]
+        away = pose_angles(clips, np.array([frame]), cycle, legs)[0]
+        land = int(cycle[np.argmin(away)])
+        states = table.state_frame
+        stop = int(states[np.searchsorted(states, land, side="right")])
+        self._earlies[t, then] = frame, land, stop
+        return frame, land, stop
+
+    def _meet(self, who: np.ndarray, shift: np.ndarray) -> None:
+        """Bend target motions of characters ``who`` on towards their objects, till contact: a
+        share of what is missing in every frame, little at both ends."""
+        first, contact = self._span[who].T
+        frame = self.cast.frame[who]
+        who = who[frame <= contact]
+        if len(who) == 0:
+            return
+        (first, contact), frame = self._span[who].T, self.cast.frame[who]
+        u = np.stack([frame - 1 - first, frame - first]) / np.maximum(contact - first, 1)
+        before, now = smooth_step(np.clip(u, 0.0, 1.0))
+        share = np.where(before < 1.0, (now - before) / np.maximum(1.0 - before, 1e-9), 0.0)
+        clips, p = self.library.clips, self.preparing
+        t = self.doing[who]
+        start = clips.facing[p.hierarchy.targets.start[t]]
+        anchor = planar_compose(self.shown.lag[who], self.cast.anchor[who])
+        there = planar_apply(anchor, planar_apply(start, p.place[t]))
+        off = (self._object[who] - there)[:, [0, 2]] * share[:, None]
+        yaw = self.facing[who, 2]
+        c, s = np.cos(yaw), np.sin(yaw)
+        shift[who, 0] = c * off[:, 0] - s * off[:, 1]
+        shift[who, 1] = s * off[:, 0] + c * off[:, 1]
+        askew = wrap_angle(self._way[who] - anchor[:, 2])
+        shift[who, 2] = np.nan_to_num(askew) * share
+
+    def aim(self, k: int, place: np.ndarray) -> None:
+        """The object [3] m of the target motion that character k does has moved."""
+        if np.isfinite(self._object[k, 0]):
+            self._object[k] = place
+
+    def _lead(self, at_once: np.ndarray | None = None) -> None:
+        """Let reference postures become those of what is prepared for now."""
+        wants = np.where(self.wants == NOTHING, self._posture_of, self.wants)
+        self._settled &= wants == self._posture_of
+        self._posture_of = wants
+        who = np.flatnonzero(~self._settled) if at_once is None else at_once
+        if len(who) == 0:
+            return
+        share = 1.0 - 0.5 ** (1.0 / (self.fps * POSTURE_HALF_LIFE))
+        share = np.where(self.alpha[who] < UNSEEN, 1.0, share)
+        if at_once is not None:
+            share = np.ones(len(who))
+        left = self.shown.lead(who, self.like, wants[who], share)
+        self._settled[who] = left < ALIKE
+
+    def _moment(self, k: int) -> Moment:
+        """What character k shows, and how it moves."""
+        root, turns = self._before
+        return Moment.between(
+            np.stack([root[k], self.shown.root_position[k]]),
+            np.stack([turns[k], self.shown.wxyz[k]]),
+            self.fps,
+        )
+
+    def _label(self, t: int) -> str:
+        return self.preparing.hierarchy.targets.label[t]
+
+
+def smooth_step(u: np.ndarray) -> np.ndarray:
+    return u * u * (3.0 - 2.0 * u)
+
+
+def pose_angles(
+    clips: ClipSet, a: np.ndarray, b: np.ndarray, joints: Sequence[int] | None = None
+) -> np.ndarray:
+    """Root mean squares [A, B] rad of the angles of joints between frames' poses, headings aside."""
+    x, y = (headless(clips.wxyz[f], clips.facing[f, 2]) for f in (a, b))
+    if joints is not None:
+        x, y = x[:, joints], y[:, joints]
+    return np.sqrt(np.mean(angle(x[:, None], y[None]) ** 2, axis=-1))
+
+
+def headless(wxyz: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+    """Poses [N, J, 4] turned so that they face +Z."""
+    out = wxyz.copy()
+    out[:, 0] = multiply(from_yaw(-yaw), out[:, 0])
+    return out

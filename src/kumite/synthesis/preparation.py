@@ -164,9 +164,9 @@ class Preparation:
         self.fps, self.foot_half_life = float(fps), float(foot_half_life)
         self.build: Build = build_of(skeleton)
         self.postures = kernels.Postures(
-            postures.wxyz,
-            postures.root,
-            postures.ankle,
+            postures.wxyz.copy(),
+            postures.root.copy(),
+            postures.ankle.copy(),
             np.array(np.broadcast_to(curve, shapes[1])),
         )
         self.root_position = np.zeros((count, 3))
@@ -193,6 +193,25 @@ class Preparation:
         for array in self.going:
             array[k] = 0
         self.going.lag[k] = planar_compose(facing, planar_inverse(facing_now))
+
+    def lead(
+        self, rows: np.ndarray, like: References, which: np.ndarray, share: np.ndarray | float
+    ) -> np.ndarray:
+        """Let postures ``rows`` [N] become more like postures ``which`` [N] of ``like``, by shares
+        [N] of what differs: how much is left [N], the most of any number."""
+        mine, left = self.postures, np.zeros(len(rows))
+        part = np.broadcast_to(np.asarray(share, dtype=np.float64), (len(rows),))
+        for name in ("root", "ankle", "wxyz"):
+            array, goal = getattr(mine, name), getattr(like, name)[which]
+            now = array[rows]
+            if name == "wxyz":  # the nearer of the two quaternions that mean the same
+                goal = np.where(np.sum(now * goal, axis=-1, keepdims=True) < 0, -goal, goal)
+            now = now + part.reshape(-1, *[1] * (now.ndim - 1)) * (goal - now)
+            if name == "wxyz":
+                now /= np.linalg.norm(now, axis=-1, keepdims=True)
+            array[rows] = now
+            left = np.maximum(left, np.abs(goal - now).reshape(len(rows), -1).max(axis=1))
+        return left
 
     def show(
         self,
@@ -375,6 +394,10 @@ class LevelFilter:
         self._past = np.zeros((len(kernel), count))
         self._begun = False
         self.delay = reach / fps
+
+    def restart(self, k: int, level: float) -> None:
+        """Let character k have been asked for this level all the time."""
+        self._past[:, k] = level
 
     def push(self, level: np.ndarray | float) -> np.ndarray:
         """The smooth levels [K] of now, given those [K] that are asked for now."""
