@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from io import TextIOWrapper
 
-from kumite.cli import motion, scenes, segment  # noqa: F401 - they add their commands
+from kumite.cli import motion, scenes, segment, train  # noqa: F401 - they add their commands
 from kumite.cli.app import app, err
 from kumite.errors import KumiteError
 

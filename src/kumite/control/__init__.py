@@ -1,5 +1,6 @@
 """Controllers: given what a character sees, choose its next action."""
 
+from kumite.control.approaching import Approach, approach_motions, trained_approach
 from kumite.control.attack import Attack, thrown
 from kumite.control.avoidance import Avoidance, AvoidanceRules, AvoidanceSearch, Standing
 from kumite.control.combination import (
@@ -46,6 +47,7 @@ __all__ = [
     "POSITIONS",
     "STYLES",
     "Annotations",
+    "Approach",
     "Attack",
     "Avoidance",
     "AvoidanceRules",
@@ -74,6 +76,7 @@ __all__ = [
     "annotate_actions",
     "approach",
     "approach_grid",
+    "approach_motions",
     "build_table",
     "cache_folder",
     "circle",
@@ -91,6 +94,7 @@ __all__ = [
     "take_place",
     "thrown",
     "trained",
+    "trained_approach",
     "trained_preparation",
     "write_table",
 ]

@@ -349,20 +349,31 @@ def repeat_cycle(
 
 
 def level_displacements(
-    clips: ClipSet, cycles: Cycles, levels: np.ndarray, *, curve: float = LEGS
+    clips: ClipSet,
+    cycles: Cycles,
+    levels: np.ndarray,
+    *,
+    curve: float = LEGS,
+    steer: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """How far each cycle gets at each level: displacements [M, A, 3] (x, z, yaw) from the facing
     frame of its start to that of its end, and how long it takes [M] s.
 
-    levels [A] in 0 … 1; curve: C of the root. What a controller plans on: steps are shortened one
-    by one, so a turning cycle is not its displacement times a number. Errors: levels out of range.
+    levels [A] in 0 … 1; curve: C of the root; steer [M] rad: an extra turn to the left, spread
+    evenly over each cycle. What a controller plans on: steps are shortened one by one, so a turning
+    cycle is not its displacement times a number. Errors: levels out of range, turns of others.
     """
     weight = weights(np.asarray(levels).reshape(-1), np.array([curve]))[:, 0]
     out = np.zeros((len(cycles), len(weight), 3))
+    turn = np.zeros(len(cycles)) if steer is None else np.asarray(steer, dtype=float)
+    if turn.shape != (len(cycles),) or not np.all(np.isfinite(turn)):
+        raise KumiteError(f"steer {turn.shape}; expected a turn for each of {len(cycles)} cycles")
     facing = clips.facing
     for m, (start, stop) in enumerate(zip(cycles.start.tolist(), cycles.stop.tolist())):
         path = facing[start : stop + 1]
-        for step in planar_compose(planar_inverse(path[:-1]), path[1:]):
+        steps = planar_compose(planar_inverse(path[:-1]), path[1:])
+        steps[:, 2] += turn[m] / len(steps)
+        for step in steps:
             out[m] = planar_compose(out[m], (1.0 - weight)[:, None] * step)
     return out, cycles.seconds
 

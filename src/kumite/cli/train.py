@@ -1,0 +1,123 @@
+"""The command that learns ahead of time how to approach and prepare."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from kumite.cli.app import JsonOption, Stages, app, err, log_line, out, print_json, progress
+
+INTERRUPTED = 130  # the status of a process that Ctrl-C has ended
+
+
+@app.command()
+def train(
+    library: Annotated[
+        Path | None,
+        typer.Argument(
+            help="A library built with 'kumite build --level preparation' (default: built-in)."
+        ),
+    ] = None,
+    steer: Annotated[
+        list[float] | None,
+        typer.Option(
+            help="An extra turn over a cycle of locomotion, to the left [degrees]; may be repeated "
+            "(default 0, 23 and 46, either way)."
+        ),
+    ] = None,
+    printed: Annotated[
+        bool, typer.Option(help="The paper's numbers, by which nobody prepares, not ours.")
+    ] = False,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same bytes.")] = 0,
+    most_batches: Annotated[
+        int, typer.Option(min=1, help="Batches of episodes after which learning stops.")
+    ] = 1000,
+    as_json: JsonOption = False,
+) -> None:
+    """Learn how to approach a goal and prepare on the way. Ctrl-C keeps what is learned."""
+    from kumite.control import PreparationSettings, cache_folder, gradual
+    from kumite.control.approaching import STEER, trained_approach
+    from kumite.graph import builtin_library, load_library
+
+    settings = PreparationSettings() if printed else gradual()
+    folder = cache_folder(library)
+    turns = STEER if steer is None else tuple(np.radians(steer).tolist())
+    done = 0
+    with progress() as bars:
+        stages = Stages(bars)
+        if library is None:
+            found = builtin_library(folder, stages, style="targets", level="preparation")
+        else:
+            stages("reading the library")
+            found = load_library(library)
+        stages("learning")
+
+        def told(batch: int, changed: float) -> None:
+            nonlocal done
+            done = batch
+            stages(f"learning: batch {batch}, {changed:.1%} of the states changed")
+
+        try:
+            approach, policy = trained_approach(
+                found,
+                folder,
+                settings,
+                steer=turns,
+                seed=seed,
+                most_batches=most_batches,
+                progress=told,
+            )
+        except KeyboardInterrupt:
+            err.print(
+                f"interrupted after batch {done}: what is learned lies in {folder}; "
+                "the same command goes on from there",
+                markup=False,
+                highlight=False,
+            )
+            raise typer.Exit(INTERRUPTED) from None
+    curve, motions = policy.curve, approach.motions
+    if as_json:
+        print_json(
+            {
+                "motions": list(motions.names),
+                "steer": [round(s, 6) for s in approach.steer.tolist()],
+                "states": int(policy.best.size),
+                "batches": len(curve),
+                "converged": policy.converged,
+                "seconds": round(policy.seconds, 3),
+                "folder": str(folder),
+                "curve": {
+                    "changed": curve.changed.tolist(),
+                    "mean_return": curve.mean_return.tolist(),
+                    "motion_seconds": curve.motion_seconds.tolist(),
+                    "given_up": curve.given_up.tolist(),
+                },
+            }
+        )
+        return
+    ended = "settled" if policy.converged else "stopped unsettled"
+    lines = [
+        f"{len(motions.names)} motions: {', '.join(motions.names)}",
+        f"{ended} after {len(curve)} batches, {curve.steps.sum() / 1e6:.1f} million actions, "
+        f"{policy.seconds:.1f} s: {policy.best.size} states",
+        "batch  changed  return  seconds of motion  given up",
+        *(
+            f"{b + 1:5}  {curve.changed[b]:7.1%}  {curve.mean_return[b]:6.3f}  "
+            f"{curve.motion_seconds[b]:17.1f}  {int(curve.given_up[b]):8}"
+            for b in _some(len(curve))
+        ),
+        f"kept in {folder}",
+    ]
+    for line in lines:
+        out.print(line, markup=False, highlight=False)
+    if not policy.converged:
+        log_line("warning: more batches settle it (--most-batches)")
+
+
+def _some(batches: int) -> list[int]:
+    """Rows of a curve to be shown: the first few, each about twice as far as the last, the end."""
+    rows = {batches - 1} | {2**k - 1 for k in range(batches.bit_length())}
+    return sorted(row for row in rows if 0 <= row < batches)
