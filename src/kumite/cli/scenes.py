@@ -58,8 +58,9 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
     """A scene ready to run: library read or performed, policies trained or found."""
     from kumite.control import cache_folder
     from kumite.graph import builtin_library, load_library
-    from kumite.scene import BoutScene, DodgeScene, EvasionScene, LiveScene
+    from kumite.scene import BoutScene, DodgeScene, EvasionScene, LiveScene, PrepareScene
     from kumite.scene.dodge import DodgeSettings
+    from kumite.scene.errands import PrepareSettings
     from kumite.scene.fighters import BoutSettings
 
     cache = cache_folder(library)
@@ -73,6 +74,8 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
             style, level = bout.library, "actions" if settings.fighters else "frames"
             if settings.dodging:
                 style, level = (settings.dodge or DodgeSettings()).library, "avoidance"
+            if settings.walking:
+                style, level = (settings.prepare or PrepareSettings()).library, "preparation"
             found = builtin_library(cache, progress=stages, style=style, level=level)
         if settings.attacker:
             style = settings.attacker[0].library
@@ -81,6 +84,13 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
             training = Training(bars)
             return EvasionScene(settings, found, attack, seed=seed, cache=cache, progress=training)
         stages("preparing the scene")
+        if settings.walking:
+
+            def learning(batch: int, changed: float) -> None:
+                if batch % 20 == 1:
+                    stages(f"learning to approach: batch {batch}, {changed:.1%} of states changed")
+
+            return PrepareScene(settings, found, seed=seed, cache=cache, progress=learning)
         if settings.dodging:
             return DodgeScene(settings, found, seed=seed)
         if settings.fighters:
@@ -108,9 +118,10 @@ def run(
     settings = _settings(
         scene, count, throws
     )  # before any long work: what is wrong is said at once
-    everyone = (*settings.character, *settings.fighters, *settings.dodging, *settings.attacker)
-    names = [c.name for c in everyone]
-    _check_outputs(output or [], [*names, *(["the crowd"] if settings.crowd else [])])
+    everyone = (
+        settings.model_copy(update={"crowd": None}).names if settings.crowd else settings.names
+    )
+    _check_outputs(output or [], [*everyone, *(["the crowd"] if settings.crowd else [])])
     live = _live_scene(settings, library, seed)
     with progress() as bars:
         task = bars.add_task(f"running {scene}", total=1.0, note="")

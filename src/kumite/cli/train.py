@@ -28,6 +28,13 @@ def train(
             "(default 0, 23 and 46, either way)."
         ),
     ] = None,
+    gait: Annotated[
+        list[str] | None,
+        typer.Option(help="A core to go with; may be repeated (default: all that go somewhere)."),
+    ] = None,
+    legs: Annotated[
+        float, typer.Option(min=0.01, help="C of root and legs, by which steps get shorter.")
+    ] = 1.0,
     printed: Annotated[
         bool, typer.Option(help="The paper's numbers, by which nobody prepares, not ours.")
     ] = False,
@@ -66,6 +73,8 @@ def train(
                 folder,
                 settings,
                 steer=turns,
+                gaits=gait,
+                curve=legs,
                 seed=seed,
                 most_batches=most_batches,
                 progress=told,

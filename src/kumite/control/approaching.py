@@ -21,13 +21,14 @@ from kumite.control.preparation import (
     gradual,
     trained_preparation,
 )
-from kumite.errors import KumiteError
+from kumite.errors import KumiteError, unknown
 from kumite.graph import Library
 from kumite.synthesis import level_displacements
+from kumite.synthesis.preparation import LEGS
 
 STEER = (0.0, 0.4, -0.4, 0.8, -0.8)  # rad over a cycle
 STEEREST = 1.6  # rad: farther no foot follows within a cycle
-MOVES = 0.15  # m/s: who is slower stands, and does not turn, for his feet would
+MOVES = 0.15  # m/s: who is slower stands
 
 
 @dataclass(frozen=True)
@@ -52,13 +53,18 @@ def approach_motions(
     library: Library,
     settings: PreparationSettings | None = None,
     steer: Sequence[float] = STEER,
+    *,
+    gaits: Sequence[str] | None = None,
+    curve: float = LEGS,
 ) -> Approach:
-    """The cores of a library for preparation, each that goes somewhere once with every ``steer``.
+    """The cores of a library for preparation that go somewhere, each once with every ``steer``.
 
     steer [rad]: extra turns over a cycle, to the left; at a level of preparation they shrink as the
-    way does. A motion follows another where the hierarchy links their cores. settings: whose levels
-    may be chosen, :func:`gradual` by default. Errors: another kind of library; turns that are none,
-    too large, or given twice.
+    way does. gaits: labels of the cores to take; None: all that go somewhere. (Who may stand on the
+    way learns to stay where its goal is hard to reach.) curve: C of the root. A motion follows
+    another where the hierarchy links their cores. settings: whose levels may be chosen,
+    :func:`gradual` by default. Errors: another kind of library; gaits that it does not have or that
+    stand; turns that are none, too large, or given twice.
     """
     preparing = library.preparing
     if preparing is None:
@@ -75,12 +81,18 @@ def approach_motions(
         raise KumiteError(f"steer {list(steer)}; expected each turn once")
     settings = settings or gradual()
     cores = preparing.hierarchy.cores
-    moves = cores.speed > MOVES
-    rows = [(c, s) for c in range(len(cores)) for s in (turns if moves[c] else (0.0,))]
+    moves = [c for c in range(len(cores)) if cores.speed[c] > MOVES]
+    known = sorted({cores.label[c] for c in moves})
+    for gait in gaits or ():
+        if gait not in known:
+            raise unknown("gait", gait, known)
+    rows = [(c, s) for c in moves if gaits is None or cores.label[c] in gaits for s in turns]
+    if not rows:
+        raise KumiteError("the library's cores go nowhere: nothing can be approached with them")
     core = np.array([c for c, _ in rows], dtype=np.int64)
     extra = np.array([s for _, s in rows])
     displacement, seconds = level_displacements(
-        library.clips, cores.take(core), settings.chosen, steer=extra
+        library.clips, cores.take(core), settings.chosen, curve=curve, steer=extra
     )
     names = [_name(cores.label[c], c, cores.label.count(cores.label[c]) > 1, s) for c, s in rows]
     follows = preparing.hierarchy.links[np.ix_(core, core)]
@@ -100,6 +112,8 @@ def trained_approach(
     settings: PreparationSettings | None = None,
     *,
     steer: Sequence[float] = STEER,
+    gaits: Sequence[str] | None = None,
+    curve: float = LEGS,
     seed: int = 0,
     most_batches: int = 1000,
     progress: Callable[[int, float], None] = lambda batch, changed: None,
@@ -108,7 +122,7 @@ def trained_approach(
     else learned and kept there (:func:`trained_preparation`). Errors: as both say.
     """
     settings = settings or gradual()
-    approach = approach_motions(library, settings, steer)
+    approach = approach_motions(library, settings, steer, gaits=gaits, curve=curve)
     policy = trained_preparation(
         approach.motions,
         folder,

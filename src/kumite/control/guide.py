@@ -8,13 +8,15 @@ controller knows nothing more, how far to prepare so as to come to rest at the p
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
-from kumite.control.approach import Approach
-from kumite.control.preparation import PreparationPolicy
+from kumite.control.approaching import Approach, trained_approach
+from kumite.control.preparation import PreparationPolicy, gradual
 from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.graph.hierarchy import ways_into_cores
@@ -30,7 +32,8 @@ class Guide:
 
     library: Library
     approach: Approach
-    policy: PreparationPolicy
+    policies: tuple[PreparationPolicy, ...]  # one for each C of the root
+    policy_of: np.ndarray  # [T] int64, the policy that prepares for a target motion
 
     def __post_init__(self) -> None:
         if self.library.preparing is None:
@@ -38,8 +41,8 @@ class Guide:
                 "the library is not one for preparation; expected one built with "
                 "'kumite build --level preparation'"
             )
-        if len(self.policy.class_after) != len(self.approach.core):
-            raise KumiteError("guide: the policy is of other motions")
+        if any(len(p.class_after) != len(self.approach.core) for p in self.policies):
+            raise KumiteError("guide: a policy is of other motions")
 
     @cached_property
     def onward(self) -> np.ndarray:
@@ -55,10 +58,18 @@ class Guide:
         level: np.ndarray,
         goal: tuple[np.ndarray, np.ndarray],
         source: tuple[np.ndarray, np.ndarray],
+        wants: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Motions (rows of the approach) and levels for W characters who did motions ``row`` and
-        are prepared to ``level``; goal and source as they see them: distance [m], angle [rad]."""
-        return self.policy.decide(row, level, *goal, *source)
+        are prepared to ``level``; goal and source as they see them: distance [m], angle [rad].
+        wants: target motions prepared for, or -1."""
+        motion, chosen = np.empty(len(row), dtype=np.int64), np.empty(len(row))
+        which = np.where(wants < 0, 0, self.policy_of[wants])
+        for n in np.unique(which).tolist():
+            of = which == n
+            seen_now = (x[of] for x in (*goal, *source))
+            motion[of], chosen[of] = self.policies[n].decide(row[of], level[of], *seen_now)
+        return motion, chosen
 
     def turn(
         self, row: np.ndarray, bearing: np.ndarray, near: np.ndarray, alpha: np.ndarray
@@ -71,19 +82,39 @@ class Guide:
         """
         most = np.abs(self.approach.steer).max()
         seconds = self.approach.motions.duration[row]
-        rate = np.clip(bearing / np.where(near, SHORTEST_TURN, seconds), -most / seconds, most / seconds)
-        return np.where(self.moves[row], rate, 0.0) * (1.0 - alpha)
-
-    @cached_property
-    def moves(self) -> np.ndarray:
-        """Which motions [M'] get somewhere: who stands does not turn."""
-        way = self.approach.motions.displacement[:, 0]
-        return np.hypot(way[:, 0], way[:, 1]) > 0.1
+        rate = bearing / np.where(near, SHORTEST_TURN, seconds)
+        rate = np.clip(rate, -most / seconds, most / seconds)
+        return rate * (1.0 - alpha)
 
     def settle(self, distance: np.ndarray) -> np.ndarray:
         """Level at a distance [m] to the place: from 0 a cell away to 1 at it, so that steps get
         shorter as the way does. (The paper forces 1 on reaching the cell, 0.6 m too soon.)"""
-        return np.clip(1.0 - distance / self.policy.settings.goal_step, 0.0, 1.0)
+        return np.clip(1.0 - distance / self.policies[0].settings.goal_step, 0.0, 1.0)
+
+
+def learned_guide(
+    library: Library,
+    folder: Path | str | None,
+    curve: np.ndarray,
+    *,
+    gaits: Sequence[str] | None = None,
+    levels: bool = True,
+    progress: Callable[[int, float], None] = lambda batch, changed: None,
+) -> Guide:
+    """A guide of this library: its policies are read from ``folder``, or learned and kept there.
+
+    curve [T]: C of the root, of each target motion: targets that share it share a policy (section
+    6). levels: whether anybody prepares; else the policies know level 0 only. Errors: as
+    :func:`trained_approach`'s.
+    """
+    settings = gradual() if levels else gradual(levels=1)
+    constants, policy_of = np.unique(curve, return_inverse=True)
+    learned = [
+        trained_approach(library, folder, settings, gaits=gaits, curve=c, progress=progress)
+        for c in constants.tolist()
+    ]
+    policies = tuple(policy for _, policy in learned)
+    return Guide(library, learned[0][0], policies, policy_of.reshape(-1))
 
 
 def seen(facing: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

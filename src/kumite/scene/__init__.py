@@ -6,6 +6,7 @@ from kumite.scene.dodge import DodgeScene
 from kumite.scene.evasion import EvasionScene
 from kumite.scene.live import LiveScene
 from kumite.scene.metrics import CharacterMetrics, Metrics, measure
+from kumite.scene.prepare import PrepareScene
 from kumite.scene.recording import Event, Recording, load_recording, save_recording
 from kumite.scene.run import record
 from kumite.scene.settings import SceneSettings, builtin_scenes, load_scene, with_count, with_throws
@@ -21,6 +22,7 @@ __all__ = [
     "LiveScene",
     "Metrics",
     "Playback",
+    "PrepareScene",
     "Recording",
     "SceneObject",
     "SceneSettings",

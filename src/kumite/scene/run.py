@@ -13,13 +13,14 @@ from kumite.scene.evasion import EvasionScene
 from kumite.scene.live import LiveScene
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.metrics import source_skate
+from kumite.scene.prepare import PrepareScene
 from kumite.scene.recording import NO_FRAME, Event, Recording
 
 MOST_BYTES = 16e9  # of one recording
 
 
 def record(
-    scene: LiveScene | BoutScene | DodgeScene | EvasionScene,
+    scene: LiveScene | BoutScene | DodgeScene | EvasionScene | PrepareScene,
     seconds: float,
     progress: Callable[[float], None] = lambda share: None,
 ) -> Recording:

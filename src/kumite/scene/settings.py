@@ -18,6 +18,13 @@ from kumite.errors import KumiteError
 from kumite.scene.attackers import AttackerSettings
 from kumite.scene.balls import BallsSettings
 from kumite.scene.dodge import DodgerSettings, DodgersSettings, DodgeSettings
+from kumite.scene.errands import (
+    OpponentsSettings,
+    PrepareSettings,
+    TargetSettings,
+    WalkerSettings,
+    WalkersSettings,
+)
 from kumite.scene.fighters import (
     ARENA,
     FARTHEST,
@@ -139,6 +146,21 @@ class SceneSettings(Settings):
     dodge: DodgeSettings | None = None  # how they search
     balls: BallsSettings | None = None  # and what is thrown
     attacker: tuple[AttackerSettings, ...] = ()  # or who attacks them
+    walker: tuple[WalkerSettings, ...] = ()  # who prepare for what they will do
+    walkers: WalkersSettings | None = None  # and many more of them
+    prepare: PrepareSettings | None = None  # how they go about it
+    target: tuple[TargetSettings, ...] = ()  # at what
+    opponents: OpponentsSettings | None = None  # or at whom
+
+    @cached_property
+    def walking(self) -> tuple[WalkerSettings, ...]:
+        """Those who prepare: named one by one, then those in rows."""
+        return self.walker + (self.walkers.walkers() if self.walkers else ())
+
+    @cached_property
+    def targets(self) -> tuple[TargetSettings, ...]:
+        """Things for them: named one by one, then those of the rows."""
+        return self.target + (self.walkers.targets() if self.walkers else ())
 
     @cached_property
     def dodging(self) -> tuple[DodgerSettings, ...]:
@@ -172,6 +194,11 @@ class SceneSettings(Settings):
 
     @model_validator(mode="after")
     def _names_fit(self) -> SceneSettings:
+        if self.walking:
+            return self._fit_walkers()
+        for part in ("prepare", "target", "opponents"):
+            if getattr(self, part):
+                raise ValueError(f"[{part}] is of [[walker]]s; there are none")
         if self.dodging:
             if self.character or self.crowd or self.fighter or self.pairs or self.object:
                 raise ValueError("[[dodger]]s are among themselves; expected nobody else")
@@ -201,6 +228,27 @@ class SceneSettings(Settings):
                 raise ValueError(
                     f"{c.name} aims at {c.aims_at!r}; expected another name of the scene ({others})"
                 )
+        return self
+
+    def _fit_walkers(self) -> SceneSettings:
+        others = ("character", "crowd", "fighter", "pairs", "bout", "cue", "vehicle", "object")
+        for part in (*others, "dodger", "dodgers", "dodge", "balls", "attacker"):
+            if getattr(self, part):
+                raise ValueError(f"[[walker]]s are among themselves; expected no [{part}]")
+        if self.targets and self.opponents:
+            raise ValueError("[[target]]s and [opponents] in one scene; expected one of them")
+        things = [t.name for t in self.targets]
+        names = [*self.names, *things]
+        twice = sorted(n for n, times in Counter(names).items() if times > 1)
+        if twice:
+            raise ValueError(f"names used twice: {', '.join(twice)}")
+        for w in self.walker:
+            for name in w.goes_to:
+                if name not in things:
+                    raise ValueError(
+                        f"{w.name} goes to {name!r}; expected a target "
+                        f"({', '.join(things) or 'there are none'})"
+                    )
         return self
 
     def _fit_dodgers(self) -> SceneSettings:
@@ -259,8 +307,12 @@ class SceneSettings(Settings):
     @property
     def names(self) -> tuple[str, ...]:
         """Of all that move by themselves."""
-        everyone = (*self.characters, *self.fighters, *self.dodging, *self.attacker)
-        return tuple(c.name for c in everyone)
+        groups = (self.characters, self.fighters, self.dodging, self.attacker, self.walking)
+        foes = range(self.opponents.count) if self.opponents else ()
+        return (
+            *(c.name for group in groups for c in group),
+            *(f"opponent {n + 1}" for n in foes),
+        )
 
     @property
     def aims(self) -> dict[str, str]:
@@ -278,13 +330,14 @@ def with_count(settings: SceneSettings, count: int) -> SceneSettings:
 
     Errors: it has neither; a number too small or too large.
     """
-    parts = [p for p in ("crowd", "pairs", "dodgers") if getattr(settings, p) is not None]
+    several = ("crowd", "pairs", "dodgers", "walkers", "opponents")
+    parts = [p for p in several if getattr(settings, p) is not None]
     part = parts[0] if parts else "crowd"
     of = getattr(settings, part)
     if of is None:
         raise KumiteError(
             f"count: {settings.title!r} names its characters one by one; expected a scene with a "
-            "[crowd], [pairs] or [dodgers]"
+            "[crowd], [pairs], [dodgers], [walkers] or [opponents]"
         )
     least = 2 if part == "crowd" else 1
     if count < least:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from kumite.clip import SIDES, ClipSet
+from kumite.control.approaching import MOVES
 from kumite.control.guide import Guide, seen, steered_for
 from kumite.errors import KumiteError
 from kumite.rotation import (
@@ -31,7 +32,6 @@ NOTHING = -1  # what somebody prepares for who prepares for nothing
 CLOSE = 0.10  # m from its place: near enough for the motion that is done there
 OFF, ASKEW = 0.35, np.radians(30)  # m and rad that a target motion may be bent to fit, at most
 PATIENCE = 0.4  # s without getting nearer to its place, then it must do
-SLOW = 0.2  # m/s: a core that is no faster stands
 NEAR = 0.6  # m within which it may turn freely
 AWRY = np.radians(75)  # so far off its heading near its place, it has missed it …
 FAR_ENOUGH = 1.3  # m … and first goes so far away
@@ -85,7 +85,8 @@ class Walkers:
         self.doing = np.full(count, ON_THE_WAY)  # the target motion done
         self.level = np.zeros(count)  # chosen
         self.alpha = np.zeros(count)  # shown
-        self.heeds = np.ones(count, dtype=bool)  # comes to rest at its place by itself
+        self.heeds = np.ones(count, dtype=bool)  # its goal is where wants is to be done
+        self.push = np.zeros((count, 2))  # m in the next frame: somebody is in the way
         self._stretch = np.full(count, NOTHING)  # of the table, played; or part of one
         self._since = np.zeros(count, dtype=np.int64)  # frames of the motion chosen
         self._heed_now = np.ones(count, dtype=bool)  # something has changed: decide at once
@@ -96,7 +97,7 @@ class Walkers:
         self._span = np.zeros((count, 2), dtype=np.int64)  # frames first and contact
         self._earlies: dict[tuple[int, int], tuple[int, int, int]] = {}
         cores = preparing.hierarchy.cores
-        self._goes = np.abs(cores.speed) > SLOW
+        self._goes = cores.speed > MOVES
         self._stand = int(np.argmin(np.abs(cores.speed)))
         self.row = np.zeros(count, dtype=np.int64)  # the motion chosen, of the approach
         self.stands = np.ones(count, dtype=bool)  # or rather stays where it is
@@ -115,6 +116,8 @@ class Walkers:
         self._settled = np.ones(count, dtype=bool)
         self.shown.show_cast(self.cast, self.alpha, np.arange(count))
         self._before = (self.shown.root_position.copy(), self.shown.wxyz.copy())
+        # Joints and their world rotations a frame ago.
+        self.shown_before = (self.shown.position.copy(), self.shown.world_wxyz.copy())
         self._settled[:] = False
 
     @property
@@ -129,9 +132,7 @@ class Walkers:
         of frames [N] of theirs."""
         clips, p = self.library.clips, self.preparing
         start = clips.facing[p.hierarchy.targets.start[t]]
-        return planar_apply(
-            planar_compose(planar_inverse(clips.facing[frame]), start), p.place[t]
-        )
+        return planar_apply(planar_compose(planar_inverse(clips.facing[frame]), start), p.place[t])
 
     def begins_at(self, t: np.ndarray) -> np.ndarray:
         """The frame [N] that target motions t are planned to be begun at."""
@@ -141,7 +142,9 @@ class Walkers:
         best = np.argmin(p.hierarchy.entry_distance, axis=0)
         return p.hierarchy.entry[best[t], t]
 
-    def stance(self, t: np.ndarray, place: np.ndarray, here: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    def stance(
+        self, t: np.ndarray, place: np.ndarray, here: np.ndarray, normal: np.ndarray
+    ) -> np.ndarray:
         """Where [N, 3] to begin targets t for objects at places [N, 3] m, coming from facing frames
         here [N, 3]. normal [N]: the way through an obstacle; NaN: from wherever one comes."""
         frame = self.begins_at(t)
@@ -173,7 +176,7 @@ class Walkers:
 
     def ready(self) -> np.ndarray:
         """Who [N] is where its target motion may begin, or as near to it as it comes."""
-        way = (self.doing == ON_THE_WAY) & (self.wants != NOTHING)
+        way = (self.doing == ON_THE_WAY) & (self.wants != NOTHING) & self.heeds
         off, askew = self.off()
         nearer = off < self._nearest - 0.01
         self._nearest = np.where(nearer, off, self._nearest)
@@ -189,7 +192,9 @@ class Walkers:
         askew = np.abs(wrap_angle(np.nan_to_num(self.goal[:, 2] - self.facing[:, 2])))
         return away, askew
 
-    def launch(self, k: int, t: int, place: np.ndarray | None = None, normal: float = np.nan) -> None:
+    def launch(
+        self, k: int, t: int, place: np.ndarray | None = None, normal: float = np.nan
+    ) -> None:
         """Let character k begin target t now, from the pose it shows.
 
         place [3] m: of the object: the motion is bent to meet it; None: as captured. normal: the
@@ -239,7 +244,9 @@ class Walkers:
     def advance(self) -> None:
         """Everyone one frame on."""
         cast, guide = self.cast, self.guide
-        self._before = (self.shown.root_position.copy(), self.shown.wxyz.copy())
+        shown = self.shown
+        self._before = (shown.root_position.copy(), shown.wxyz.copy())
+        self.shown_before = (shown.position.copy(), shown.world_wxyz.copy())
         self._leave_early()
         self._choose(cast.waiting)
         cast.advance()
@@ -249,7 +256,7 @@ class Walkers:
         bearing = seen(self.facing, steered_for(self.facing, self.goal))[1]
         self.alpha = np.where(busy, 0.0, smooth)
         askew = np.nan_to_num(wrap_angle(self.goal[:, 2] - self.facing[:, 2]))
-        turned = (np.abs(askew) > AWRY) & (self.wants != NOTHING)
+        turned = (np.abs(askew) > AWRY) & (self.wants != NOTHING) & self.heeds
         self._passed = ~busy & (off < FAR_ENOUGH) & (self._passed | ((off < NEAR) & turned))
         bearing = np.where(self._passed, 0.0, bearing)
         if self.prepares:
@@ -262,7 +269,10 @@ class Walkers:
             self.row, (1.0 - square) * bearing + square * askew, off < NEAR, self.alpha
         )
         shift = np.zeros((cast.count, 3))
-        shift[:, 2] = np.where(busy, 0.0, turn / self.fps)
+        goes = ~busy & ~self.stands
+        shift[:, 2] = np.where(goes, turn / self.fps, 0.0)
+        pushed = np.flatnonzero(np.any(self.push != 0.0, axis=1))
+        shift[pushed, :2] += turned_by(-self.facing[pushed, 2], self.push[pushed])
         self._meet(np.flatnonzero(busy & np.isfinite(self._object[:, 0])), shift)
         self._lead()
         self.shown.show_cast(cast, self.alpha, np.arange(cast.count), shift)
@@ -304,11 +314,15 @@ class Walkers:
         away, _ = seen(facing, goal[:, :2])
         _, bearing = seen(facing, steered_for(facing, goal))
         far, aside = seen(facing, self.source[who])
-        far = np.where(nothing, guide.policy.settings.farthest, far)
+        far = np.where(nothing, guide.policies[0].settings.farthest, far)
         self.row[who], level = guide.choose(
-            self.row[who], self.level[who], (away, bearing), (far, np.where(nothing, np.pi, aside))
+            self.row[who],
+            self.level[who],
+            (away, bearing),
+            (far, np.where(nothing, np.pi, aside)),
+            self.wants[who],
         )
-        self.stands[who] = nothing & (away < ARRIVED)
+        self.stands[who] = ~self.heeds[who] & (away < ARRIVED)
         unprepared = nothing | self._passed[who] | (not self.prepares)
         self.level[who] = np.where(unprepared, 0.0, level)
         self._since[who] = 0
@@ -345,7 +359,7 @@ class Walkers:
             self._lead(at_once=np.array([k]))
 
     def _early(self, t: int, then: int) -> tuple[int, int, int]:
-        """Of target t, when ``then`` comes soon: the frame to leave it at, the frame of a walk to go
+        """Of target t, when ``then`` comes soon: where to leave it, the frame of a walk to go
         on from, and where that comes to a state."""
         if (t, then) in self._earlies:
             return self._earlies[t, then]
@@ -383,10 +397,7 @@ class Walkers:
         anchor = planar_compose(self.shown.lag[who], self.cast.anchor[who])
         there = planar_apply(anchor, planar_apply(start, p.place[t]))
         off = (self._object[who] - there)[:, [0, 2]] * share[:, None]
-        yaw = self.facing[who, 2]
-        c, s = np.cos(yaw), np.sin(yaw)
-        shift[who, 0] = c * off[:, 0] - s * off[:, 1]
-        shift[who, 1] = s * off[:, 0] + c * off[:, 1]
+        shift[who, :2] = turned_by(-self.facing[who, 2], off)
         askew = wrap_angle(self._way[who] - anchor[:, 2])
         shift[who, 2] = np.nan_to_num(askew) * share
 
@@ -423,6 +434,12 @@ class Walkers:
         return self.preparing.hierarchy.targets.label[t]
 
 
+def turned_by(yaw: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """Ways [N, 2] (x, z) turned by angles [N]."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    return np.stack([c * way[:, 0] + s * way[:, 1], -s * way[:, 0] + c * way[:, 1]], axis=1)
+
+
 def smooth_step(u: np.ndarray) -> np.ndarray:
     return u * u * (3.0 - 2.0 * u)
 
@@ -430,7 +447,7 @@ def smooth_step(u: np.ndarray) -> np.ndarray:
 def pose_angles(
     clips: ClipSet, a: np.ndarray, b: np.ndarray, joints: Sequence[int] | None = None
 ) -> np.ndarray:
-    """Root mean squares [A, B] rad of the angles of joints between frames' poses, headings aside."""
+    """Root mean squares [A, B] rad of the joints' angles between frames' poses, headings aside."""
     x, y = (headless(clips.wxyz[f], clips.facing[f, 2]) for f in (a, b))
     if joints is not None:
         x, y = x[:, joints], y[:, joints]

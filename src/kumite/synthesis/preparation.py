@@ -261,7 +261,14 @@ class Preparation:
         """:meth:`show` of what a cast shows."""
         ankle = cast.position[:, self.build.legs[:, 2]]
         self.show(
-            cast.root_position, cast.wxyz, cast.facing, ankle, cast.contacts, level, reference, shift
+            cast.root_position,
+            cast.wxyz,
+            cast.facing,
+            ankle,
+            cast.contacts,
+            level,
+            reference,
+            shift,
         )
 
     def _run(self, level, reference, moves, shown) -> None:

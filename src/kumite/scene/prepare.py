@@ -1,0 +1,507 @@
+"""A scene of people who prepare for what they will do on the way to it (Shum et al. 2013)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from kumite.body import lay_body
+from kumite.clip import LIMBS
+from kumite.control.guide import learned_guide, seen
+from kumite.errors import KumiteError, unknown
+from kumite.graph import Library
+from kumite.kernels.blow import swept_contact
+from kumite.rotation import from_yaw, planar_apply, planar_inverse, rotate
+from kumite.scene.balls import capsules_of
+from kumite.scene.errands import PrepareSettings
+from kumite.scene.floor import TARGET_PARTS
+from kumite.scene.memory import refuse_too_many
+from kumite.scene.recording import Event
+from kumite.scene.stage import SceneObject
+from kumite.scene.things import STRIKE, Things
+from kumite.scene.walkers import NOTHING, ON_THE_WAY, Walkers
+from kumite.synthesis.preparation import curves
+
+NOBODY = NO_THING = -1
+ROOM = 0.5  # m between two pelvises under which people give way to each other …
+GIVE_WAY = 0.4  # … at so many m/s
+REACH = 1.0  # m from a walker at which opponents stop
+SKIN = 0.13  # m from the middle of a trunk to where it is struck
+STRUCK_AROUND = 0.12  # s around its contact in which a blow may land
+RECOIL = 0.02  # m that a struck segment gives way per m/s of the blow
+NOTICED = 4.0  # m within which a thing ahead is prepared for by who is led by hand …
+AHEAD = np.radians(75)  # … so far to either side
+WATCHED = 0.15  # s over which it is seen how opponents move
+
+
+class PrepareScene:
+    """Walkers, things and opponents, one frame at a step. The same seed gives the same frames.
+
+    Follows the :class:`~kumite.scene.stage.Stage` protocol, so the studio can show it.
+    """
+
+    def __init__(
+        self,
+        settings,
+        library: Library,
+        *,
+        seed: int = 0,
+        cache: Path | None = None,
+        progress: Callable[[int, float], None] = lambda batch, changed: None,
+    ) -> None:
+        """Errors: another kind of library; motions that it does not have; obstacles that these do
+        not clear; somebody who begins in an obstacle; too many characters."""
+        if library.preparing is None:
+            raise KumiteError(
+                f"{settings.title!r} is about preparation; expected a library built with "
+                "'kumite build --level preparation'"
+            )
+        self.settings, self.library, self.title = settings, library, settings.title
+        self.fps, self.skeleton = library.clips.fps, library.clips.skeleton
+        self.prepare = settings.prepare or PrepareSettings()
+        self.names = settings.names
+        self.users = len(settings.walking)
+        refuse_too_many(len(self.names), len(self.skeleton))
+        self.motions = library.preparing.hierarchy.targets.label
+        targets = settings.targets
+        foes = settings.opponents
+        for label in (*(t.motion for t in targets), *(foes.motions if foes else ())):
+            if label not in self.motions:
+                raise unknown("target motion", label, self.motions)
+        for label in self.prepare.curves:
+            if label not in self.motions:
+                raise unknown("target motion of prepare.curves", label, self.motions)
+        self.things = Things(targets, library.preparing, self.motions)
+        if foes:
+            kinds = library.preparing.kind[[self.motions.index(m) for m in foes.motions]]
+            if np.any(kinds != STRIKE):
+                raise KumiteError(
+                    f"opponents.motions {list(foes.motions)}: expected blows; "
+                    f"{foes.motions[int(np.argmax(kinds != STRIKE))]} is none"
+                )
+        for w in settings.walking:
+            within = self.things.inside(np.array(w.position))
+            if within is not None:
+                raise KumiteError(
+                    f"position of {w.name}: it begins in {self.things.names[within]}; "
+                    "expected a place that is free"
+                )
+        self.body = lay_body(self.skeleton)
+        self._tips = [self.skeleton.tip(limb) for limb in LIMBS]
+        self._trunk = [i for i, part in enumerate(self.body.parts) if part in TARGET_PARTS[:4]]
+        self.curve = self._curves()
+        self.guide = learned_guide(
+            library,
+            cache,
+            self.curve[:, 0],
+            gaits=self.prepare.gaits or None,
+            levels=self.prepare.preparation != "none",
+            progress=progress,
+        )
+        self.automatic = self.prepare.automatic
+        self.reset(seed)
+
+    def _curves(self) -> np.ndarray:
+        """Constants C [T, J] of the target motions."""
+        p = self.prepare
+        if p.preparation != "ours":
+            return np.ones((len(self.motions), len(self.skeleton)))
+        return np.array(
+            [curves(self.skeleton, {**p.curve, **p.curves.get(m, {})}) for m in self.motions]
+        )
+
+    def reset(self, seed: int) -> None:
+        """Start again from the beginning, with a seed."""
+        self.seed, self.frame = int(seed), 0
+        self.events: list[Event] = []
+        self.rng = np.random.default_rng(self.seed)
+        self.things.reset()
+        walking, foes = self.settings.walking, self.settings.opponents
+        homes = [[*w.position, np.radians(w.yaw_deg)] for w in walking]
+        if foes:
+            middle = np.mean([w.position for w in walking], axis=0)
+            bearing = 2 * np.pi * (np.arange(foes.count) + self.rng.random()) / foes.count
+            for b in bearing.tolist():
+                at = middle + foes.distance * np.array([np.sin(b), np.cos(b)])
+                homes.append([*at, b + np.pi])
+        self.walkers = Walkers(
+            self.guide,
+            np.array(homes),
+            self._event,
+            preparation=self.prepare.preparation,
+            curve=self.curve,
+        )
+        count = len(homes)
+        self.thing = np.full(count, NO_THING)  # what each goes to
+        self.foe = np.full(count, NOBODY)  # or whom at
+        self.told = np.full((count, 2), np.nan)  # m: or where, by hand
+        self.turn = np.zeros(count, dtype=np.int64)  # how far each is in its course
+        self.flees = np.zeros(count, dtype=np.int64)  # frame until which an opponent keeps away
+        self.to_do = np.full(count, NOTHING)  # the motion to be done at a foe
+        self._landed = np.zeros(count, dtype=bool)
+        self._depth = np.full(count, -np.inf)  # m, deepest in the obstacle that it passes
+        self._at = np.full(count, NO_THING)  # the thing that a target motion is done at
+        self._whom = np.full(count, NOBODY)
+        self._busy = np.zeros(count, dtype=bool)
+        self._course = [
+            [self.things.names.index(n) for n in w.goes_to] for w in self.settings.walking
+        ]
+        self._path = np.tile(self.walkers.facing[:, :2], (max(2, round(WATCHED * self.fps)), 1, 1))
+
+    @property
+    def cast(self):
+        return self.walkers.cast
+
+    @property
+    def root_position(self) -> np.ndarray:
+        return self.walkers.shown.root_position
+
+    @property
+    def wxyz(self) -> np.ndarray:
+        return self.walkers.shown.wxyz
+
+    @property
+    def objects(self) -> list[SceneObject]:
+        return self.things.objects
+
+    def move_object(self, name: str, position: np.ndarray) -> None:
+        """Balls may be put elsewhere; obstacles stay."""
+        self.things.move(name, position)
+
+    # What may be told by hand.
+
+    def go(self, k: int, place: np.ndarray) -> np.ndarray:
+        """Send walker k to a place [2] m of the ground; where it really goes: out of an obstacle to
+        the nearer side of it.
+        """
+        place = np.array(place, dtype=np.float64)
+        if not np.all(np.isfinite(place)):
+            raise KumiteError("goal: expected two finite numbers")
+        within = self.things.inside(place)
+        if within is not None:
+            yaw = self.things.yaw[within]
+            way = np.array([np.sin(yaw), np.cos(yaw)])
+            along = (place - self.things.position[within, [0, 2]]) @ way
+            place = place + ((0.6 if along >= 0 else -0.6) - along) * way
+            self._event("moved goal", k, thing=self.things.names[within])
+        self.told[k], self.thing[k] = place, NO_THING
+        self.walkers.decide_anew(np.array([k]))
+        return place
+
+    def go_to(self, k: int, name: str) -> None:
+        """Send walker k to a thing. Errors: there is none of that name."""
+        if name not in self.things.names:
+            raise unknown("thing", name, self.things.names)
+        self.thing[k], self.told[k] = self.things.names.index(name), np.nan
+        self.walkers.decide_anew(np.array([k]))
+
+    def trigger(self, k: int, motion: str) -> bool:
+        """Let walker k do a target motion now; False while it does another. It is bent to meet what
+        is at hand for it, if anything is. Errors: there is none of that name.
+        """
+        if motion not in self.motions:
+            raise unknown("target motion", motion, self.motions)
+        if self.walkers.doing[k] != ON_THE_WAY:
+            return False
+        t = self.motions.index(motion)
+        fits = self.walkers.wants[k] == t and self._aimed(k)
+        self._launch(k, t, bend=fits)
+        return True
+
+    # A frame.
+
+    def step(self) -> bool:
+        w = self.walkers
+        self._path = np.concatenate([self._path[1:], w.facing[None, :, :2]])
+        self._assign()
+        self._aim()
+        for k in w.ready().tolist():
+            if self.automatic and k < self.users and (self.thing[k] >= 0 or self.foe[k] >= 0):
+                self._launch(k, int(w.wants[k]), bend=True)
+        self._keep_apart()
+        w.advance()
+        self.frame += 1
+        self._contacts()
+        self.things.step(1.0 / self.fps)
+        return True
+
+    def _assign(self) -> None:
+        """Who goes where by itself."""
+        w, things = self.walkers, self.things
+        if self.settings.opponents:
+            self._assign_foes()
+        if not self.automatic or len(things) == 0:
+            return
+        free = (self.thing[: self.users] == NO_THING) & np.isnan(self.told[: self.users, 0])
+        for k in np.flatnonzero(free).tolist():
+            if self._course[k]:
+                self.thing[k] = self._course[k][self.turn[k] % len(self._course[k])]
+            else:
+                away = np.hypot(*(things.position[:, [0, 2]] - w.facing[k, :2]).T)
+                away[~things.lie] = np.inf
+                if np.isfinite(away.min()):
+                    self.thing[k] = int(np.argmin(away))
+            w.decide_anew(np.array([k]))
+
+    def _assign_foes(self) -> None:
+        """Walkers turn to the nearest opponent that does not keep away, opponents to walkers."""
+        w, foes = self.walkers, np.arange(self.users, len(self.names))
+        come = foes[self.flees[foes] <= self.frame]
+        for k in range(self.users):
+            if w.doing[k] != ON_THE_WAY:
+                continue
+            near = NOBODY
+            if len(come) and np.isnan(self.told[k, 0]):
+                away = np.hypot(*(w.facing[come, :2] - w.facing[k, :2]).T)
+                if self.foe[k] in come:  # nobody turns to and fro between two who are equally near
+                    away[come == self.foe[k]] -= 0.5
+                near = int(come[np.argmin(away)])
+            if near != self.foe[k]:
+                self.foe[k] = near
+                if near != NOBODY and self.to_do[k] == NOTHING:
+                    self._choose_blow(k)
+                w.decide_anew(np.array([k]))
+
+    def _choose_blow(self, k: int) -> None:
+        labels = self.settings.opponents.motions
+        self.to_do[k] = self.motions.index(labels[int(self.rng.integers(len(labels)))])
+
+    def _aim(self) -> None:
+        """Goals, sources of influence and what is prepared for, of all."""
+        w = self.walkers
+        place, normal = self._objects_of(np.arange(len(self.names)))
+        has = np.isfinite(place[:, 0])
+        wants = np.full(len(has), NOTHING)
+        wants[self.thing >= 0] = self.things.motion[self.thing[self.thing >= 0]]
+        wants = np.where(self.foe != NOBODY, self.to_do, wants)
+        w.heeds[:] = has & np.isnan(self.told[:, 0])
+        busy = np.flatnonzero((w.doing != ON_THE_WAY) & (self._whom != NOBODY))
+        for k in busy.tolist():
+            left = (self.library.preparing.contact[w.doing[k]] - w.cast.frame[k]) / self.fps
+            if left > 0:
+                w.aim(k, self._foe_place(k, int(self._whom[k]), int(w.doing[k]), left))
+        who = np.flatnonzero(has)
+        if len(who):
+            w.goal[who] = w.stance(wants[who], place[who], w.facing[who], normal[who])
+            w.source[who] = place[who][:, [0, 2]]
+        led = np.flatnonzero(np.isfinite(self.told[:, 0]))
+        for k in led.tolist():
+            w.goal[k] = [*self.told[k], np.nan]
+            wants[k] = self._notice(k)
+        rest = np.flatnonzero(~has & np.isnan(self.told[:, 0]))
+        if not self.automatic:
+            for k in rest[rest < self.users].tolist():
+                w.goal[k] = [*w.facing[k, :2], np.nan]
+                wants[k] = self._notice(k)
+        for k in rest[rest >= self.users].tolist():
+            w.goal[k] = self._closing_in(k)
+        changed = np.flatnonzero(wants != w.wants)
+        w.wants[:] = wants
+        w.decide_anew(changed)
+
+    def _notice(self, k: int) -> int:
+        """The motion for the nearest thing ahead of who is led by hand, which is its source of
+        influence; or for nothing."""
+        w, things = self.walkers, self.things
+        if self.foe[k] != NOBODY:
+            w.source[k] = w.facing[self.foe[k], :2]
+            return int(self.to_do[k])
+        if len(things) == 0:
+            return NOTHING
+        here = np.tile(w.facing[k], (len(things), 1))
+        away, aside = seen(here, things.position[:, [0, 2]])
+        away[(np.abs(aside) > AHEAD) | (away > NOTICED)] = np.inf
+        n = int(np.argmin(away))
+        if not np.isfinite(away[n]):
+            return NOTHING
+        w.source[k] = things.position[n, [0, 2]]
+        return int(things.motion[n])
+
+    def _objects_of(self, who: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Where the objects [N, 3] are that characters go to, and which way through [N]; NaN."""
+        w = self.walkers
+        place, normal = np.full((len(who), 3), np.nan), np.full(len(who), np.nan)
+        at = np.flatnonzero(self.thing[who] >= 0)
+        if len(at):
+            k = who[at]
+            place[at], normal[at] = self.things.gates(w.facing[k], self.thing[k])
+        for n in np.flatnonzero(self.foe[who] != NOBODY).tolist():
+            k = int(who[n])
+            t = int(self.to_do[k])
+            seconds = float(w.seconds_to_contact(np.array([t]))[0])
+            place[n] = self._foe_place(k, int(self.foe[k]), t, seconds)
+        return place, normal
+
+    def _foe_place(self, k: int, foe: int, t: int, seconds: float) -> np.ndarray:
+        """Where opponent ``foe`` [3] is to be struck in so many seconds, if it goes on as now."""
+        w = self.walkers
+        moves = (self._path[-1, foe] - self._path[0, foe]) / ((len(self._path) - 1) / self.fps)
+        at = w.shown.root_position[foe, [0, 2]] + seconds * moves
+        way = w.facing[k, :2] - at
+        at = at + SKIN * way / max(float(np.hypot(*way)), 1e-9)
+        return np.array([at[0], self.library.preparing.place[t, 1], at[1]])
+
+    def _closing_in(self, k: int) -> np.ndarray:
+        """Where [3] an opponent goes: up to the nearest walker, or away from it for a while."""
+        w = self.walkers
+        away = np.hypot(*(w.facing[: self.users, :2] - w.facing[k, :2]).T)
+        at = w.facing[int(np.argmin(away)), :2]
+        out = w.facing[k, :2] - at
+        out /= max(float(np.hypot(*out)), 1e-9)
+        far = self.settings.opponents.distance if self.flees[k] > self.frame else REACH
+        goal = at + far * out
+        return np.array([*goal, np.nan])
+
+    def _aimed(self, k: int) -> bool:
+        return bool(self.thing[k] >= 0 or self.foe[k] != NOBODY)
+
+    def _launch(self, k: int, t: int, *, bend: bool) -> None:
+        place, normal = self._objects_of(np.array([k]))
+        meets = bend and bool(np.isfinite(place[0, 0]))
+        self.walkers.launch(k, t, place[0] if meets else None, float(normal[0]))
+        self._landed[k], self._depth[k] = False, -np.inf
+        self._at[k] = self.thing[k] if meets else self._nearest_thing(k, t)
+        self._whom[k] = self.foe[k]
+        limb = int(self.library.preparing.limb[t])
+        if limb >= 0:
+            self._event("strike", k, limb=LIMBS[limb], blow=t)
+
+    def _nearest_thing(self, k: int, t: int) -> int:
+        """The thing that a motion launched by hand may meet."""
+        fits = self.things.motion == t
+        if not np.any(fits):
+            return NO_THING
+        ground = self.things.position[:, [0, 2]]
+        away = np.hypot(*(ground - self.walkers.facing[k, :2]).T)
+        n = int(np.argmin(np.where(fits, away, np.inf)))
+        return n if away[n] < NOTICED else NO_THING
+
+    def _keep_apart(self) -> None:
+        """People give way to each other."""
+        w = self.walkers
+        w.push[:] = 0.0
+        if len(self.names) < 2:
+            return
+        ground = w.shown.root_position[:, [0, 2]]
+        for a, b in KDTree(ground).query_pairs(ROOM, output_type="ndarray").tolist():
+            way = ground[b] - ground[a]
+            away = max(float(np.hypot(*way)), 1e-6)
+            push = min(GIVE_WAY / self.fps, 0.5 * (ROOM - away)) * way / away
+            w.push[a] -= push
+            w.push[b] += push
+
+    def _contacts(self) -> None:
+        """What target motions meet in this frame."""
+        w, p = self.walkers, self.library.preparing
+        busy = w.doing != ON_THE_WAY
+        over = np.flatnonzero(self._busy & ~busy)
+        self._busy = busy
+        for k in over.tolist():
+            self._finish(k)
+        around = STRUCK_AROUND * self.fps
+        for k in np.flatnonzero(busy).tolist():
+            t = int(w.doing[k])
+            late = w.cast.frame[k] - p.contact[t]
+            if p.kind[t] != STRIKE:
+                self._pass(k, int(self._at[k]))
+            elif abs(late) <= around and not self._landed[k]:
+                self._strike(k, t)
+            if w.cast.frame[k] > p.past[t] and self.thing[k] == self._at[k]:
+                self._next(k)
+
+    def _next(self, k: int) -> None:
+        """Walker k has done what was to be done at its thing: on to the next."""
+        if self.thing[k] != NO_THING:
+            self.thing[k] = NO_THING
+            self.turn[k] += 1
+        self.to_do[k], self.foe[k] = NOTHING, NOBODY
+
+    def _finish(self, k: int) -> None:
+        n = int(self._at[k])
+        if self._depth[k] > -np.inf and n != NO_THING:
+            self._event(
+                "passed", k, thing=self.things.names[n], clearance=-float(round(self._depth[k], 4))
+            )
+        self._at[k], self._whom[k] = NO_THING, NOBODY
+
+    def _pass(self, k: int, n: int) -> None:
+        if n == NO_THING:
+            return
+        w = self.walkers
+        off = np.hypot(*(self.things.position[n, [0, 2]] - w.facing[k, :2]))
+        if off > 1.5 + 0.5 * self.things.width[n]:
+            return
+        shown = w.shown
+        capsules = capsules_of(self.body, shown.position[k : k + 1], shown.world_wxyz[k : k + 1])
+        depth, part = self.things.depth(n, capsules[:, 0], self.body)
+        if depth > 0 >= self._depth[k]:
+            self._event("touched", k, thing=self.things.names[n], part=self.body.parts[part])
+        self._depth[k] = max(self._depth[k], depth)
+
+    def _tip_now(self, k: int, limb: int, pose: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+        joint, offset = self._tips[limb]
+        position, world = pose
+        return position[k, joint] + rotate(world[k, joint], offset)
+
+    def _strike(self, k: int, t: int) -> None:
+        """Does the blow of target t land in this frame?"""
+        w, limb = self.walkers, int(self.library.preparing.limb[t])
+        before, now = w.shown_before, (w.shown.position, w.shown.world_wxyz)
+        p0, p1 = (self._tip_now(k, limb, pose) for pose in (before, now))
+        velocity = (p1 - p0) * self.fps
+        n, foe = int(self._at[k]), int(self._whom[k])
+        if n != NO_THING:
+            at, r = self.things.position[n], float(self.things.radius[n])
+            when = swept_contact(p0, p1, at, at, at, at, r, r, 0.03)
+            if when >= 0:
+                self.things.kick(n, velocity)
+                self._hit(
+                    k, limb, self.things.names[n], self.things.names[n], velocity, p0, p1, when
+                )
+        elif foe != NOBODY:
+            body = self.body
+            a, b = (
+                capsules_of(body, x[0][foe : foe + 1], x[1][foe : foe + 1])[:, 0]
+                for x in (before, now)
+            )
+            best = (2.0, 0)
+            for part in self._trunk:
+                when = swept_contact(
+                    p0, p1, a[0, part], a[1, part], b[0, part], b[1, part],
+                    body.radius_start[part], body.radius_end[part], 0.03,
+                )  # fmt: skip
+                if 0.0 <= when < best[0]:
+                    best = (when, part)
+            if best[0] <= 1.0:
+                when, part = best
+                self._hit(k, limb, self.names[foe], body.parts[part], velocity, p0, p1, when)
+                self._reel(foe, part, p0 + when * (p1 - p0), velocity)
+
+    def _hit(self, k, limb, victim, part, velocity, p0, p1, when) -> None:
+        self._landed[k] = True
+        place = p0 + when * (p1 - p0)
+        self._event(
+            "hit",
+            k,
+            victim=victim,
+            limb=LIMBS[limb],
+            part=part,
+            speed=round(float(np.linalg.norm(velocity)), 4),
+            place=[round(float(x), 4) for x in place],
+            time=round((self.frame - 1 + when) / self.fps, 4),
+        )
+
+    def _reel(self, foe: int, part: int, place: np.ndarray, velocity: np.ndarray) -> None:
+        """A struck opponent gives way, and keeps away for a while."""
+        w = self.walkers
+        back = planar_inverse(w.shown.lag[foe])
+        way = rotate(from_yaw(back[2]), RECOIL * velocity)
+        w.cast.strike(foe, int(self.body.joint[part]), planar_apply(back, place), way)
+        self.flees[foe] = self.frame + round(self.settings.opponents.rest * self.fps)
+        w.decide_anew(np.array([foe]))
+
+    def _event(self, kind: str, k: int, **data) -> None:
+        self.events.append(Event(self.frame, kind, self.names[int(k)], data))
