@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kumite.control.approaching import Approach, trained_approach
+from kumite.control.approaching import STEEREST, Approach, trained_approach
 from kumite.control.preparation import PreparationPolicy, gradual
 from kumite.errors import KumiteError
 from kumite.graph import Library
@@ -77,13 +77,12 @@ class Guide:
         """How fast [rad/s] to turn towards what is seen at ``bearing`` [rad].
 
         The motions of an approach turn by a few angles; what is played turns by what is needed, in
-        the time of the motion and at most by the largest of these; sooner near the place. Who is
-        prepared turns as much less as the way gets shorter (alpha: 0 to 1).
+        the time of the motion and by ``STEEREST`` at most; sooner near the place. Who is prepared
+        turns as much less as the way gets shorter (alpha: 0 to 1).
         """
-        most = np.abs(self.approach.steer).max()
         seconds = self.approach.motions.duration[row]
         rate = bearing / np.where(near, SHORTEST_TURN, seconds)
-        rate = np.clip(rate, -most / seconds, most / seconds)
+        rate = np.clip(rate, -STEEREST / seconds, STEEREST / seconds)
         return rate * (1.0 - alpha)
 
     def settle(self, distance: np.ndarray) -> np.ndarray:

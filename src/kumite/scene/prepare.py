@@ -34,6 +34,7 @@ STRUCK_AROUND = 0.12  # s around its contact in which a blow may land
 RECOIL = 0.02  # m that a struck segment gives way per m/s of the blow
 NOTICED = 4.0  # m within which a thing ahead is prepared for by who is led by hand …
 AHEAD = np.radians(75)  # … so far to either side
+BEHIND = 1.5  # m that an opponent behind counts as farther away than one ahead
 WATCHED = 0.15  # s over which it is seen how opponents move
 
 
@@ -255,7 +256,8 @@ class PrepareScene:
                 continue
             near = NOBODY
             if len(come) and np.isnan(self.told[k, 0]):
-                away = np.hypot(*(w.facing[come, :2] - w.facing[k, :2]).T)
+                away, aside = seen(np.tile(w.facing[k], (len(come), 1)), w.facing[come, :2])
+                away += BEHIND * np.abs(aside) / np.pi
                 if self.foe[k] in come:  # nobody turns to and fro between two who are equally near
                     away[come == self.foe[k]] -= 0.5
                 near = int(come[np.argmin(away)])

@@ -32,9 +32,11 @@ NOTHING = -1  # what somebody prepares for who prepares for nothing
 CLOSE = 0.10  # m from its place: near enough for the motion that is done there
 OFF, ASKEW = 0.35, np.radians(30)  # m and rad that a target motion may be bent to fit, at most
 PATIENCE = 0.4  # s without getting nearer to its place, then it must do
+SHARP = np.radians([35, 90])  # angles between which a turn gets sharp
+ON_THE_SPOT = 0.85  # of the way that is not gone in a sharp turn …
+SLOWS = 2.5  # … and how fast that share changes, 1/s
 NEAR = 0.6  # m within which it may turn freely
-AWRY = np.radians(75)  # so far off its heading near its place, it has missed it …
-FAR_ENOUGH = 1.3  # m … and first goes so far away
+AWRY = np.radians(60)  # off its heading: as bad as a cell off its place
 ARRIVED = 0.8  # m from a place where nothing is to be done: there a walk is ended
 KEEP = 2.5  # m to the next place: nearer, and the style is kept up until then
 POSTURE_HALF_LIFE = 0.12  # s in which one reference posture becomes another
@@ -101,7 +103,7 @@ class Walkers:
         self._stand = int(np.argmin(np.abs(cores.speed)))
         self.row = np.zeros(count, dtype=np.int64)  # the motion chosen, of the approach
         self.stands = np.ones(count, dtype=bool)  # or rather stays where it is
-        self._passed = np.zeros(count, dtype=bool)  # has got past its place: first gets away
+        self._slow = np.zeros(count)  # share of the way that is not gone, in sharp turns
         states, links = library.table.state_frame, preparing.hierarchy
         out = np.searchsorted(states, links.link_leave[self._stand])
         self._leave_stand = np.where(links.links[self._stand], out, NOTHING)
@@ -249,6 +251,7 @@ class Walkers:
         self.shown_before = (shown.position.copy(), shown.world_wxyz.copy())
         self._leave_early()
         self._choose(cast.waiting)
+        came_from = cast.facing
         cast.advance()
         busy = self.doing != ON_THE_WAY
         smooth = self.filter.push(np.where(busy, 0.0, self.level))
@@ -256,26 +259,48 @@ class Walkers:
         bearing = seen(self.facing, steered_for(self.facing, self.goal))[1]
         self.alpha = np.where(busy, 0.0, smooth)
         askew = np.nan_to_num(wrap_angle(self.goal[:, 2] - self.facing[:, 2]))
-        turned = (np.abs(askew) > AWRY) & (self.wants != NOTHING) & self.heeds
-        self._passed = ~busy & (off < FAR_ENOUGH) & (self._passed | ((off < NEAR) & turned))
-        bearing = np.where(self._passed, 0.0, bearing)
         if self.prepares:
+            # Who is askew has as far to go: prepared it could not turn.
+            wrong = NEAR * np.abs(askew) / AWRY
             before = (np.abs(bearing) < 0.5 * np.pi) | (off < OFF)  # its place, or at it
-            rests = before & ~self._passed & self.heeds & (self.wants != NOTHING) & ~busy
-            self.alpha = np.where(rests, np.maximum(smooth, guide.settle(off)), self.alpha)
+            rests = before & self.heeds & (self.wants != NOTHING) & ~busy
+            self.alpha = np.where(rests, np.maximum(smooth, guide.settle(off + wrong)), self.alpha)
         headed = ~np.isnan(self.goal[:, 2])
-        square = np.where(headed & ~self._passed, np.clip(1.0 - off / NEAR, 0.0, 1.0), 0.0)
-        turn = guide.turn(
-            self.row, (1.0 - square) * bearing + square * askew, off < NEAR, self.alpha
-        )
-        shift = np.zeros((cast.count, 3))
-        goes = ~busy & ~self.stands
-        shift[:, 2] = np.where(goes, turn / self.fps, 0.0)
-        pushed = np.flatnonzero(np.any(self.push != 0.0, axis=1))
-        shift[pushed, :2] += turned_by(-self.facing[pushed, 2], self.push[pushed])
+        square = np.where(headed, np.clip((NEAR - off) / (NEAR - CLOSE), 0.0, 1.0), 0.0)
+        by = (1.0 - square) * bearing + square * askew
+        there = np.where(self.heeds, square * np.minimum(np.abs(askew) / AWRY, 1.0), 0.0)
+        shift = self._steer(by, off < NEAR, there, ~busy & ~self.stands, came_from)
         self._meet(np.flatnonzero(busy & np.isfinite(self._object[:, 0])), shift)
         self._lead()
         self.shown.show_cast(cast, self.alpha, np.arange(cast.count), shift)
+
+    def _steer(
+        self,
+        by: np.ndarray,
+        near: np.ndarray,
+        there: np.ndarray,
+        goes: np.ndarray,
+        came_from: np.ndarray,
+    ) -> np.ndarray:
+        """What all go and turn [K, 3] in this frame besides their locomotion.
+
+        They turn towards what is seen at angles ``by`` [rad], and in sharp turns they go less far:
+        up to nearly on the spot, as where ``there`` (0 to 1) only the heading is missing. came_from
+        [K, 3]: where the locomotion was a frame ago.
+        """
+        alpha, shift = self.alpha, np.zeros((len(by), 3))
+        turn = self.guide.turn(self.row, by, near, alpha)
+        shift[:, 2] = np.where(goes, turn / self.fps, 0.0)
+        sharp = np.clip((np.abs(by) - SHARP[0]) / (SHARP[1] - SHARP[0]), 0.0, 1.0)
+        wanted = np.where(goes, ON_THE_SPOT * np.maximum(sharp, there), 0.0)
+        most = SLOWS / self.fps
+        self._slow += np.clip(wanted - self._slow, -most, most)
+        step = planar_compose(planar_inverse(came_from), self.cast.facing)[:, :2]
+        moves = self.doing == ON_THE_WAY
+        shift[:, :2] -= np.where(moves, self._slow * (1.0 - alpha), 0.0)[:, None] * step
+        pushed = np.flatnonzero(np.any(self.push != 0.0, axis=1))
+        shift[pushed, :2] += turned_by(-self.facing[pushed, 2], self.push[pushed])
+        return shift
 
     def _choose(self, who: np.ndarray) -> None:
         """Those at the end of what they play take what comes next."""
@@ -323,7 +348,7 @@ class Walkers:
             self.wants[who],
         )
         self.stands[who] = ~self.heeds[who] & (away < ARRIVED)
-        unprepared = nothing | self._passed[who] | (not self.prepares)
+        unprepared = nothing | (not self.prepares)
         self.level[who] = np.where(unprepared, 0.0, level)
         self._since[who] = 0
         # Who stands goes on looking out for something to do.
