@@ -26,9 +26,10 @@ from kumite.scene.walkers import NOTHING, ON_THE_WAY, Walkers
 from kumite.synthesis.preparation import curves
 
 NOBODY = NO_THING = -1
-ROOM = 0.5  # m between two pelvises under which people give way to each other …
-GIVE_WAY = 0.4  # … at so many m/s
-REACH = 1.0  # m from a walker at which opponents stop
+ROOM = 0.5  # m between two pelvises under which people give way to each other
+APART = 1.0  # m, the same of two opponents
+GIVE_WAY = 0.4  # m/s at which they do
+REACH, RING = 0.6, 2.4  # m from a walker at which its opponent stops, and the others do
 SKIN = 0.13  # m from the middle of a trunk to where it is struck
 STRUCK_AROUND = 0.12  # s around its contact in which a blow may land
 RECOIL = 0.02  # m that a struck segment gives way per m/s of the blow
@@ -353,7 +354,8 @@ class PrepareScene:
         at = w.facing[int(np.argmin(away)), :2]
         out = w.facing[k, :2] - at
         out /= max(float(np.hypot(*out)), 1e-9)
-        far = self.settings.opponents.distance if self.flees[k] > self.frame else REACH
+        far = REACH if k in self.foe[: self.users] else RING
+        far = self.settings.opponents.distance if self.flees[k] > self.frame else far
         goal = at + far * out
         return np.array([*goal, np.nan])
 
@@ -388,10 +390,11 @@ class PrepareScene:
         if len(self.names) < 2:
             return
         ground = w.shown.root_position[:, [0, 2]]
-        for a, b in KDTree(ground).query_pairs(ROOM, output_type="ndarray").tolist():
+        for a, b in KDTree(ground).query_pairs(APART, output_type="ndarray").tolist():
             way = ground[b] - ground[a]
             away = max(float(np.hypot(*way)), 1e-6)
-            push = min(GIVE_WAY / self.fps, 0.5 * (ROOM - away)) * way / away
+            room = APART if min(a, b) >= self.users else ROOM
+            push = np.clip(0.5 * (room - away), 0.0, GIVE_WAY / self.fps) * way / away
             w.push[a] -= push
             w.push[b] += push
 
