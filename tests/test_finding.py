@@ -104,9 +104,9 @@ def test_clips_without_targets():
 
 
 def test_clips_that_begin_within_their_target(takes: ClipSet):
-    strikes = find_strikes(takes)
+    strikes, front = find_strikes(takes), int(takes.clip_start[takes.names.index("front_kick")])
     kick = int(strikes.frame[strikes.limb == LIMBS.index("right_foot")][0])
-    spans = {"stand": slice(0, 150), "part": slice(kick - 8, kick + 60)}
+    spans = {"stand": slice(front, front + 300), "part": slice(kick - 8, kick + 60)}
     clips = concatenate(
         [
             Clip(name, takes.skeleton, 60.0, takes.root_position[s], takes.wxyz[s])

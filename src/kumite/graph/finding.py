@@ -12,6 +12,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from kumite.annotate import (
+    Balance,
     Contacts,
     Cycles,
     Marked,
@@ -38,6 +39,7 @@ HIGH = 0.17  # m that both feet are off the ground: of who runs 0.09, in a sidew
 TOGETHER = 0.6  # s between two departures that are one: crouch, flight and landing
 SMOOTH = 0.05  # s
 NEAR, FAR = 0.25, 1.2  # s before and after it, in which locomotion is left and taken up again …
+UNSTEADY = 0.6  # rad that a start weighs more that is out of balance: no reference posture is near
 CROUCH = 0.25  # … and so much farther from a departure: who jumps crouches first
 MOST = 4  # targets of one name that are kept
 LONGEST = 8.0  # s
@@ -77,6 +79,8 @@ def find_targets(
         goes[max(a - near, 0) : b + near + 1] = False
     cycles = find_cycles(clips, contacts, where=goes)
     away, edges, clip = _away(clips, cycles), clips.clip_start, clips.clip_of_frame
+    balance = find_balance(clips, contacts)
+    begins = away + np.where(balance.balanced, 0.0, UNSTEADY)
     rows: list[tuple[int, int, int]] = []
     for a, b, more in hearts:
         first, last = int(edges[clip[a]]), int(edges[clip[a] + 1]) - 1
@@ -84,7 +88,7 @@ def find_targets(
         after = np.arange(b + near, min(b + far, last - 1) + 1)
         if len(before) == 0 or len(after) == 0:
             continue  # the clip begins or ends within it
-        start, stop = (int(x[np.argmin(away[x])]) for x in (before, after))
+        start, stop = int(before[np.argmin(begins[before])]), int(after[np.argmin(away[after])])
         if rows and start < rows[-1][1]:
             continue  # the other one has it
         mark = find_mark(clips, start, stop, None if more else strikes)
@@ -95,7 +99,7 @@ def find_targets(
             f"expected {NEAR:g} s of locomotion or standing before and after"
         )
     start, stop, mark = np.array(rows, dtype=np.int64).T
-    names = _names(clips, contacts, strikes, Targets(("",) * len(rows), start, stop, mark))
+    names = _names(clips, contacts, balance, strikes, Targets(("",) * len(rows), start, stop, mark))
     apart = away[start] + away[stop]
     kept: list[tuple[int, str]] = []
     for name in dict.fromkeys(names):
@@ -108,13 +112,11 @@ def find_targets(
     ), cycles
 
 
-def _names(clips: ClipSet, contacts: Contacts, strikes: Strikes, targets: Targets) -> list[str]:
+def _names(
+    clips: ClipSet, contacts: Contacts, balance: Balance, strikes: Strikes, targets: Targets
+) -> list[str]:
     """Targets [T] called by what they are about, such as under, or right_foot_kick."""
-    ways, body, balance = (
-        strike_directions(clips, strikes),
-        lay_body(clips.skeleton),
-        find_balance(clips, contacts),
-    )
+    ways, body = strike_directions(clips, strikes), lay_body(clips.skeleton)
     out = []
     for t in range(len(targets)):
         start, mark = int(targets.start[t]), int(targets.mark[t])
