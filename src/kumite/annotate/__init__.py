@@ -2,7 +2,13 @@
 without hand work; and how like a person they move.
 """
 
-from kumite.annotate.action_file import read_actions, read_avoidance, write_actions
+from kumite.annotate.action_file import (
+    Marked,
+    read_actions,
+    read_avoidance,
+    read_marked,
+    write_actions,
+)
 from kumite.annotate.actions import (
     DIRECTIONS,
     DIRECTIONS_OF,
@@ -40,6 +46,7 @@ __all__ = [
     "CycleSettings",
     "Cycles",
     "Likeness",
+    "Marked",
     "Reference",
     "Strikes",
     "centre_of_mass",
@@ -58,6 +65,7 @@ __all__ = [
     "only_blows",
     "read_actions",
     "read_avoidance",
+    "read_marked",
     "shorter_rests",
     "write_actions",
 ]

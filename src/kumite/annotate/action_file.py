@@ -9,7 +9,9 @@
 A clip's heading says how many frames it has; under it stands a line for each action: clip, start,
 stop (frames of the clip; stop is one past the last), kind, limb, direction, label. Words with a
 space in them stand in double quotes. Behind the label may stand ``avoid=START-STOP`` words: the
-avoidance parts whose middle lies in the action, which may begin before it or end after it.
+avoidance parts whose middle lies in the action, which may begin before it or end after it. A person
+may add ``mark=FRAME``, the first frame of what the action is about, which makes it a target motion,
+or ``cycle``, which makes it a cycle of locomotion.
 
 **Edits survive.** Nothing but the file itself tells what a person has done, so that it can be
 moved, mailed and kept in version control:
@@ -30,29 +32,33 @@ and fills the rest from a new analysis. Where both claim a frame, the person's l
 
 from __future__ import annotations
 
-import json
-import re
-import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from kumite import files
+from kumite.annotate.action_lines import (
+    AVOID,
+    CYCLE,
+    HEADING,
+    MARK,
+    NONE,
+    OURS,
+    ActionFile,
+    Line,
+    Section,
+    middle,
+    parse,
+    quoted,
+)
 from kumite.annotate.actions import DIRECTIONS, DIRECTIONS_OF, KINDS, NO_LIMB, Actions
 from kumite.annotate.avoidance import AvoidanceParts
 from kumite.clip import LIMBS, ClipSet
-from kumite.errors import KumiteError, at, unknown
-from kumite.mocap import text
+from kumite.errors import at, unknown
 
-NONE = "-"  # no limb, no label
-HEADING = "=="
-AVOID = "avoid="
-OURS = "#:"  # begins a comment of ours, which is written anew each time
-_WORD = re.compile(r'\s*("(?:[^"\\]|\\.)*"|#.*|[^\s#"][^\s"]*)')
 SLIVER = 0.15  # s: less than this left of a line is not an action
-_MOST = 10**9  # frames: a number beyond it is no frame
 
 _HELP = (
     "actions found by `kumite segment`: clip, start, stop, kind, limb, direction, label, check",
@@ -60,62 +66,11 @@ _HELP = (
     "start and stop are frames of the clip, stop is one past the last; words with spaces in quotes",
     "the check word tells lines that you have not touched; delete it to keep a line as it is",
     f"{AVOID}START-STOP behind a label: frames in which the body is out of where it was",
+    f"{MARK}FRAME behind a label: the action is a target motion (to prepare for), from there on",
+    f"{CYCLE} behind a label: the action is a cycle of locomotion",
     *(f"{kind}: {', '.join(ways)}" for kind, ways in DIRECTIONS_OF.items()),
     f"limb: {', '.join(LIMBS)} or {NONE}; a sword strikes with the hand that holds it",
 )
-
-
-@dataclass(frozen=True)
-class Line:
-    """One action as it stands in a file, in frames of its clip."""
-
-    clip: str
-    start: int
-    stop: int
-    kind: str
-    limb: str  # or NONE
-    direction: str
-    label: str
-    by_hand: bool = False
-    comment: str = ""  # behind it, with its #
-    number: int | None = None  # line in the file it was read from
-    avoid: tuple[tuple[int, int], ...] = ()  # (start, stop) of its avoidance parts, in order
-
-    @property
-    def words(self) -> tuple[str, ...]:
-        return (
-            _quoted(self.clip),
-            str(self.start),
-            str(self.stop),
-            self.kind,
-            self.limb,
-            _quoted(self.direction),
-            _quoted(self.label or NONE),
-            *(f"{AVOID}{a}-{b}" for a, b in self.avoid),
-        )
-
-    @property
-    def check(self) -> str:
-        return f"{zlib.crc32(' '.join(self.words).encode()) & 0xFFFFFF:06x}"
-
-
-@dataclass(frozen=True)
-class Section:
-    """What a file says of one clip."""
-
-    lines: tuple[Line, ...]  # in order of their starts
-    frames: int | None = None  # that the heading gives; None without a heading
-    fps: float | None = None
-    comments: tuple[tuple[int, str], ...] = ()  # (start of the line after it, comment)
-    number: int | None = None  # of the heading
-
-
-@dataclass(frozen=True)
-class ActionFile:
-    """A file of actions: a section a clip, and comments that stand before all of them."""
-
-    sections: Mapping[str, Section]
-    comments: tuple[str, ...] = ()
 
 
 @dataclass
@@ -131,160 +86,6 @@ class Kept:
 
 
 # Reading -----------------------------------------------------------------------------------------
-
-
-def parse(path: Path | str) -> ActionFile:
-    """What a file holds, checked word by word. Errors: the first that is wrong, with its line."""
-    path = Path(path)
-    sections: dict[str, Section] = {}
-    lines: dict[str, list[Line]] = {}
-    waiting: list[str] = []
-    head: list[str] = []
-    current: str | None = None
-    comments: dict[str, list[tuple[int, str]]] = {}
-    source = text.decode(path, text.read_bytes(path))
-    for number, row in enumerate(source.split("\n"), 1):
-        words, comment = _split(path, number, row)
-        if not words:
-            if comment and not comment.startswith(OURS):
-                waiting.append(comment)
-            continue
-        if words[0] == HEADING:
-            _end_comments(waiting, current, head, comments)
-            current, section = _heading(path, number, words)
-            if current in sections:
-                raise at(path, number, f"a second heading of clip {current!r}; expected one")
-            sections[current] = section
-            continue
-        line = _line(path, number, words, comment)
-        place = comments.setdefault(line.clip, []) if current is not None or lines else None
-        for c in waiting:
-            if place is None:
-                head.append(c)
-            else:
-                place.append((line.start, c))
-        waiting.clear()
-        lines.setdefault(line.clip, []).append(line)
-    _end_comments(waiting, current, head, comments)
-    for name in (*lines, *comments):
-        sections.setdefault(name, Section(()))
-    for name, section in sections.items():
-        mine = sorted(lines.get(name, ()), key=lambda x: (x.start, x.stop))
-        sections[name] = replace(section, lines=tuple(mine), comments=tuple(comments.get(name, ())))
-    return ActionFile(sections, tuple(head))
-
-
-def _end_comments(
-    waiting: list[str],
-    current: str | None,
-    head: list[str],
-    comments: dict[str, list[tuple[int, str]]],
-) -> None:
-    """Comments with no line after them belong to the end of the section they stand in."""
-    for comment in waiting:
-        if current is None:
-            head.append(comment)
-        else:
-            comments.setdefault(current, []).append((_MOST, comment))
-    waiting.clear()
-
-
-def _split(path: Path, number: int, row: str) -> tuple[list[str], str]:
-    """The words of a row and the comment behind them."""
-    words: list[str] = []
-    i, row = 0, row.rstrip()
-    while i < len(row):
-        match = _WORD.match(row, i)
-        if match is None:
-            raise at(
-                path, number, f"{text.shown(row[i:].strip())} has no closing quote; expected one"
-            )
-        word = match[1]
-        if word.startswith("#"):
-            return words, word
-        if word.startswith('"'):
-            try:
-                word = json.loads(word)
-            except ValueError:
-                raise at(
-                    path, number, f"{text.shown(word)} is no quoted word; expected one as in JSON"
-                ) from None
-        words.append(word)
-        i = match.end()
-    return words, ""
-
-
-def _heading(path: Path, number: int, words: list[str]) -> tuple[str, Section]:
-    if len(words) != 7 or words[3] != "frames" or words[5:] != ["a", "second"]:
-        shape = f"{HEADING} CLIP N frames RATE a second"
-        raise at(path, number, f"{text.shown(' '.join(words))}; expected {shape}")
-    frames = _frame(path, number, words[2], "the clip's number of frames")
-    fps = text.number(path, number, words[4], "the clip's frames a second")
-    if frames == 0 or fps <= 0:
-        raise at(path, number, "a clip without frames; expected numbers more than 0")
-    return words[1], Section((), frames, fps, (), number)
-
-
-def _line(path: Path, number: int, words: list[str], comment: str) -> Line:
-    avoid = [word for word in words[7:] if word.startswith(AVOID)]
-    words = [*words[:7], *(word for word in words[7:] if not word.startswith(AVOID))]
-    if len(words) not in (7, 8):
-        shape = (
-            f"clip start stop kind limb direction label, perhaps {AVOID}START-STOP, "
-            "and perhaps a check word"
-        )
-        raise at(
-            path, number, f"{len(words)} words; expected {shape} (labels with spaces in quotes)"
-        )
-    clip, first, last, kind, limb, direction, label = words[:7]
-    start = _frame(path, number, first, "the frame at which the action starts")
-    stop = _frame(path, number, last, "the frame at which the action stops")
-    try:
-        if kind not in KINDS:
-            raise unknown("kind", kind, KINDS)
-        if limb != NONE and limb not in LIMBS:
-            raise unknown("limb", limb, (*LIMBS, NONE))
-        if direction not in DIRECTIONS_OF[kind]:
-            raise unknown(f"direction of {kind}", direction, DIRECTIONS_OF[kind])
-    except KumiteError as error:
-        raise at(path, number, str(error)) from None
-    if stop <= start:
-        raise at(path, number, f"stop {stop} is not after start {start}; expected a later frame")
-    label = "" if label == NONE else label
-    parts = tuple(sorted(_part(path, number, word, start, stop) for word in avoid))
-    line = Line(clip, start, stop, kind, limb, direction, label, True, comment, number, parts)
-    untouched = len(words) == 8 and words[7] == line.check and not comment
-    return replace(line, by_hand=not untouched)
-
-
-def _part(path: Path, number: int, word: str, start: int, stop: int) -> tuple[int, int]:
-    """An avoidance part of the action from start to stop."""
-    match = re.fullmatch(r"(\d{1,9})-(\d{1,9})", word.removeprefix(AVOID), re.ASCII)
-    if match is None:
-        raise at(
-            path, number, f"{text.shown(word)} is no part; expected {AVOID}START-STOP, two frames"
-        )
-    a, b = int(match[1]), int(match[2])
-    if b <= a:
-        raise at(path, number, f"{word}: stop {b} is not after start {a}; expected a later frame")
-    if not start <= middle(a, b) < stop:
-        raise at(
-            path,
-            number,
-            f"{word} is not of the action {start} to {stop}; expected its middle in it",
-        )
-    return a, b
-
-
-def middle(start: int, stop: int) -> int:
-    """The frame that says which action a part belongs to."""
-    return (start + stop - 1) // 2
-
-
-def _frame(path: Path, number: int, word: str, what: str) -> int:
-    if not re.fullmatch(r"\d{1,9}", word, re.ASCII):
-        raise at(path, number, f"{text.shown(word)} is not a frame; expected {what}, from 0")
-    return int(word)
 
 
 def check(path: Path | str, known: ActionFile, clips: Sequence[ClipSet]) -> None:
@@ -357,6 +158,38 @@ def read_actions(path: Path | str, clips: ClipSet) -> Actions:
 def read_avoidance(path: Path | str, clips: ClipSet) -> AvoidanceParts:
     """The avoidance parts that a file of actions gives clips. Errors: as :func:`read_actions`."""
     return to_parts(_lines_of(path, clips), clips)
+
+
+@dataclass(frozen=True)
+class Marked:
+    """What a file of actions says of preparation, in frames of a set of clips."""
+
+    targets: tuple[tuple[str, int, int, int], ...]  # label, start, stop (its last frame), mark
+    cycles: tuple[tuple[str, int, int], ...]  # label, start, stop (its last frame)
+
+
+def read_marked(path: Path | str, clips: ClipSet) -> Marked:
+    """The target motions and cycles that a file marks, each label once: a second one is numbered.
+
+    Errors: as :func:`read_actions`; no action has a mark.
+    """
+    first = {n: int(a) for n, a in zip(clips.names, clips.clip_start)}
+    targets, cycles, used = [], [], set()
+    for x in _lines_of(path, clips):
+        if x.mark is None and not x.cycle:
+            continue
+        label, again = x.label or x.clip, 2
+        while label in used:
+            label, again = f"{x.label or x.clip}_{again}", again + 1
+        used.add(label)
+        ends = first[x.clip] + x.start, first[x.clip] + x.stop - 1
+        if x.mark is None:
+            cycles.append((label, *ends))
+        else:
+            targets.append((label, *ends, first[x.clip] + x.mark))
+    if not targets:
+        raise at(path, None, f"no action is a target motion; expected {MARK}FRAME behind a label")
+    return Marked(tuple(targets), tuple(cycles))
 
 
 def _lines_of(path: Path | str, clips: ClipSet) -> list[Line]:
@@ -569,7 +402,7 @@ def _text(content: ActionFile) -> str:
     width = [max((len(row[k]) for row in words), default=0) for k in range(columns)]
     out = [f"{OURS} {line}" for line in _HELP] + list(content.comments)
     for name, section in content.sections.items():
-        out += ["", f"{HEADING} {_quoted(name)}  {section.frames} frames  {section.fps!r} a second"]
+        out += ["", f"{HEADING} {quoted(name)}  {section.frames} frames  {section.fps!r} a second"]
         waiting = sorted(section.comments, key=lambda c: c[0])
         for x in section.lines:
             while waiting and waiting[0][0] <= x.start:
@@ -587,9 +420,3 @@ def _text(content: ActionFile) -> str:
 def _columns(line: Line) -> list[str]:
     """The words of a line, its avoidance parts in one column, the eighth."""
     return [*line.words[:7], " ".join(line.words[7:])]
-
-
-def _quoted(word: str) -> str:
-    """A word as it stands in a file."""
-    plain = word and not re.search(r'[\s#"]', word) and word != HEADING
-    return word if plain and word.isprintable() else json.dumps(word, ensure_ascii=True)

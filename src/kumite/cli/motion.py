@@ -162,8 +162,9 @@ def build(
     level: Annotated[
         str,
         typer.Option(
-            help="A graph of frames, of whole actions (kumite segment), or one in which an "
-            "avoidance can soon be begun."
+            help="A graph of frames, of whole actions (kumite segment), one in which an "
+            "avoidance can soon be begun, or one of locomotion and what it prepares for "
+            "(preparation)."
         ),
     ] = "frames",
     event: Annotated[
@@ -180,8 +181,9 @@ def build(
     actions: Annotated[
         Path | None,
         typer.Option(
-            help="The text file of 'kumite segment', for its actions (--level actions) and its "
-            "avoidance parts (--avoidance, --level avoidance); default: as found."
+            help="The text file of 'kumite segment', for its actions (--level actions), its "
+            "avoidance parts (--avoidance, --level avoidance), or the target motions and cycles "
+            "that you marked (--level preparation); default: as found."
         ),
     ] = None,
     avoidance: Annotated[
@@ -190,7 +192,10 @@ def build(
     ] = False,
     alike: Annotated[
         float | None,
-        typer.Option(help="Actions: postures nearer than that are one node [rad] (default 1.2)."),
+        typer.Option(
+            help="Actions: postures nearer than that are one node [rad] (default 1.2); "
+            "preparation: a target is entered from cores nearer than that (default 1.8)."
+        ),
     ] = None,
     most_ways: Annotated[
         int | None,
@@ -203,6 +208,17 @@ def build(
     offered: Annotated[
         int | None,
         typer.Option(help="Avoidance: as many of them are offered then at most (default 16)."),
+    ] = None,
+    threshold: Annotated[
+        float | None,
+        typer.Option(
+            help="Preparation: how far the legs of a reference posture may be from those that a "
+            "target starts with [rad², all joints together] (default 4)."
+        ),
+    ] = None,
+    most: Annotated[
+        int | None,
+        typer.Option(help="Preparation: as many found targets of one name at most (default 4)."),
     ] = None,
     as_json: JsonOption = False,
     fps: FpsOption = None,
@@ -222,17 +238,22 @@ def build(
         save_library,
     )
 
+    if avoidance and level == "preparation":
+        raise KumiteError("--avoidance: of other levels; expected none with --level preparation")
+    if most is not None and actions is not None:
+        raise KumiteError("--most: of targets that are found; expected none with --actions")
     avoidance = avoidance or level == "avoidance"
     _refuse_of_another_level(
         level,
         {
             "frames": {"--event": event, "--per-second": per_second},
             "actions": {
-                "--actions": None if avoidance else actions,
-                "--alike": alike,
+                "--actions": None if avoidance or level == "preparation" else actions,
+                "--alike": None if level == "preparation" else alike,
                 "--most-ways": most_ways,
             },
             "avoidance": {"--every": every, "--offered": offered},
+            "preparation": {"--threshold": threshold, "--most": most},
         },
     )
     refuse_unwritable(output)  # before the work, not after
@@ -246,6 +267,9 @@ def build(
         elif level == "avoidance":
             given = _given(every=every, offered=offered)
             library = build_avoidance_library(clips, parts, **given, progress=stages)
+        elif level == "preparation":
+            given = _given(alike=alike, threshold=threshold)
+            library = _preparation(clips, actions, _given(most=most), given, stages)
         else:
             mine = None if actions is None else read_actions(actions, clips)
             given = _given(alike=alike, most_ways=most_ways)
@@ -267,6 +291,26 @@ def build(
             markup=False,
             highlight=False,
         )
+
+
+def _preparation(
+    clips: Any, actions: Path | None, finding: dict[str, Any], given: dict[str, Any], stages: Stages
+) -> Any:
+    """The library for preparation of these clips: targets as a file marks them, or as found."""
+    from kumite.annotate import find_contacts, find_strikes, read_marked
+    from kumite.graph import build_preparation_library, find_targets, marked_targets
+
+    marked = None if actions is None else read_marked(actions, clips)
+    stages("finding contacts and effective hits")
+    contacts, strikes = find_contacts(clips), find_strikes(clips)
+    stages("finding target motions")
+    if marked is None:
+        targets, cycles = find_targets(clips, contacts, strikes, **finding)
+    else:
+        targets, cycles = marked_targets(clips, contacts, marked)
+    return build_preparation_library(
+        clips, targets, cycles, **given, contacts=contacts, strikes=strikes, progress=stages
+    )
 
 
 def _refuse_of_another_level(level: str, options: dict[str, dict[str, Any]]) -> None:

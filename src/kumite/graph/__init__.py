@@ -4,6 +4,7 @@ from kumite.graph.avoiding import build_avoidance_library, find_avoiding_transit
 from kumite.graph.builtin import builtin_library
 from kumite.graph.distance import PoseFeatures, pose_features
 from kumite.graph.errands import build_preparation_library
+from kumite.graph.finding import find_targets, marked_targets
 from kumite.graph.hierarchy import (
     Hierarchy,
     Targets,
@@ -33,10 +34,12 @@ __all__ = [
     "build_preparation_library",
     "builtin_library",
     "find_avoiding_transitions",
+    "find_targets",
     "find_transitions",
     "fold",
     "hierarchy_table",
     "load_library",
+    "marked_targets",
     "pose_features",
     "save_library",
     "strongest_component",

@@ -23,7 +23,7 @@ from kumite.errors import KumiteError
 from kumite.graph.distance import pose_features
 from kumite.graph.hierarchy import ALIKE, Targets, build_hierarchy, check_targets, hierarchy_table
 from kumite.graph.library import Library
-from kumite.graph.preparing import Preparing, find_about
+from kumite.graph.preparing import Preparing, find_about, own_blows
 
 
 def build_preparation_library(
@@ -65,7 +65,8 @@ def build_preparation_library(
         for start, mark in zip(targets.start.tolist(), targets.mark.tolist())
     ]
     reference = np.array([r.frame for r in references])
-    about = [find_about(clips, strikes, targets, t, int(reference[t]), body) for t in range(count)]
+    blows = own_blows(clips, strikes)
+    about = [find_about(clips, blows, targets, t, int(reference[t]), body) for t in range(count)]
     progress("comparing poses")
     hierarchy = build_hierarchy(
         clips,

@@ -13,7 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-from kumite.annotate import Strikes
+from kumite.annotate import Strikes, only_blows
+from kumite.annotate.contacts import velocity
+from kumite.annotate.kinds import strike_directions
 from kumite.body import Body, lay_body
 from kumite.clip import LIMBS, ClipSet, freeze
 from kumite.errors import KumiteError
@@ -33,6 +35,8 @@ PLACE = 0.01  # m: how finely places along the way are told apart
 PIECE = 0.01  # m between the spheres that a capsule is taken as: 0.4 mm in a thin one's height
 GOES = 0.3  # m: who gets less far passes nothing
 UNDER, OVER = 0.85, 0.10  # of the height at the start: a bar below, a hurdle above is an obstacle …
+RUNS = 1.4  # m/s of the hips: above it only high kicks are blows, arms and legs swing as they go
+ROLLS = 0.10  # m: a foot that is lower in a blow, fast as it may be, stands or rolls
 KICK = 0.40  # … and who clears one strikes only with a foot that is so high, of the same
 
 
@@ -146,7 +150,8 @@ def find_about(
     Arms swing in a jump, legs in a run up to it: whoever clears an obstacle strikes only with a
     foot that is high. An obstacle is one that the body is wholly before at frame ``reference`` (and
     until then) and wholly behind when the target ends: where the bar can be lowest, or the hurdle
-    highest, whichever is more out of the way of who stands. body: of these clips, if it is known.
+    highest, whichever is more out of the way of who stands. strikes: :func:`own_blows`. body: of
+    these clips, if it is known.
     """
     start, stop, mark = (int(x[t]) for x in (targets.start, targets.stop, targets.mark))
     moved = clips.world[0][stop, 0] - clips.world[0][start, 0]
@@ -170,6 +175,16 @@ def find_about(
     kind = KINDS.index("under" if ducks else "over")
     place = planar_apply(to_facing, pelvis)
     return About(kind, NO_LIMB, contact, place, max(clear, 0.0), way, passed.past(contact))
+
+
+def own_blows(clips: ClipSet, strikes: Strikes) -> Strikes:
+    """The strikes that no locomotion has: of who runs only high kicks, and no foot that stands."""
+    hips = velocity(clips.world[0][:, clips.skeleton.joint("pelvis")], clips)[strikes.frame]
+    runs = np.hypot(hips[:, 0], hips[:, 2]) > RUNS
+    foot = np.array([LIMBS[k].endswith("foot") for k in strikes.limb.tolist()], dtype=bool)
+    kick = np.array([way == "kick" for way in strike_directions(clips, strikes)], dtype=bool)
+    stands = foot & (strikes.tip[strikes.frame, strikes.limb, 1] < ROLLS)
+    return only_blows(strikes, kick | ~(runs | stands))
 
 
 def _blow(
