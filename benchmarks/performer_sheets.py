@@ -21,8 +21,9 @@ def main() -> None:
         performance = performer.perform(style, mirrored=False)
         root, wxyz, labels = [], [], []
         for clip, truth in zip(performance.clips, performance.truth):
-            # From the first move that is no rest, a quarter second apart.
-            first = next((a.start for a in truth.actions if a.kind != "idle"), 0)
+            # From the first target, or else the first move that is no rest, a quarter second apart.
+            moved = [a for a in truth.actions if a.kind != "idle"]
+            first = next((a.start for a in [*(a for a in moved if a.mark is not None), *moved]), 0)
             frames = np.minimum(first + np.arange(COLUMNS) * 15, len(clip) - 1)
             root.append(clip.root_position[frames])
             wxyz.append(clip.wxyz[frames])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +10,11 @@ import pytest
 
 from kumite import performer
 from kumite.annotate import find_contacts, find_strikes, measure_likeness
+from kumite.annotate.balance import find_balance
 from kumite.annotate.likeness import body_ends
 from kumite.body import lay_body
 from kumite.clip import (
+    LEG_ROLES,
     LIMBS,
     SIDES,
     ClipSet,
@@ -365,6 +368,38 @@ def test_targets_are_done_and_marked():
             else:
                 assert any(a.mark < s.frame < a.stop for s in truth.strikes)
     assert len(seen) == 6
+
+
+@pytest.mark.parametrize("seed", [0, 203])
+def test_who_goes_for_a_target_gets_ready_first(seed: int):
+    """Up to the mark on both feet and in balance, there in a posture of its own."""
+    performance = performer.perform("targets", seed=seed, mirrored=False)
+    clips = concatenate(list(performance.clips))
+    balance = find_balance(clips, find_contacts(clips))
+    s = clips.skeleton
+    legs = [s.joint(f"{side}_{part}") for side in SIDES for part in LEG_ROLES]
+    upper = [j for j in range(1, len(s)) if j not in legs]
+    ready = {}
+    for truth, first in zip(performance.truth, clips.clip_start.tolist()):
+        for a in truth.actions:
+            if a.mark is None:
+                continue
+            assert 0.35 * FPS <= a.mark - a.start <= 0.6 * FPS, a.label
+            assert truth.on_ground[a.start : a.mark + 1].all(), a.label
+            assert not truth.on_ground[a.mark : a.mark + round(0.35 * FPS)].all(), a.label
+            assert balance.distance[first + a.start : first + a.mark + 1].max() < -0.02, a.label
+            before, now = clips.wxyz[first + a.start], clips.wxyz[first + a.mark]
+            bent = angle(before, now)
+            assert np.mean(bent[upper]) > np.radians(20), a.label
+            assert np.sum(bent[[j for j in legs if "Toes" not in s.names[j]]] ** 2) < 4.0, a.label
+            sunk = clips.root_position[[first + a.start, first + a.mark], 1] @ [1, -1]
+            assert sunk > (0.05 if a.label in ("crawl_under", "duck_under", "jump_over") else 0.03)
+            ready[a.label] = now
+    assert len(ready) == 6
+    apart = [
+        np.mean(angle(a[upper], b[upper])) for a, b in itertools.combinations(ready.values(), 2)
+    ]
+    assert min(apart) > np.radians(12)
 
 
 def test_falls_end_on_the_ground_and_getting_up_in_guard(boxing: Performance):
