@@ -414,7 +414,7 @@ class PrepareScene:
                 self._pass(k, int(self._at[k]))
             elif abs(late) <= around and not self._landed[k]:
                 self._strike(k, t)
-            if w.cast.frame[k] > p.past[t] and self.thing[k] == self._at[k]:
+            if w.cast.frame[k] >= p.past[t] and self.thing[k] == self._at[k]:
                 self._next(k)
 
     def _next(self, k: int) -> None:

@@ -31,7 +31,7 @@ NOTHING = -1  # what somebody prepares for who prepares for nothing
 
 CLOSE = 0.10  # m from its place: near enough for the motion that is done there
 OFF, ASKEW = 0.35, np.radians(30)  # m and rad that a target motion may be bent to fit, at most
-PATIENCE = 0.4  # s without getting nearer to its place, then it must do
+PATIENCE, LONGEST_PATIENCE = 0.4, 1.5  # s without getting nearer, prepared or not: it must do
 SHARP = np.radians([35, 90])  # angles between which a turn gets sharp
 ON_THE_SPOT = 0.85  # of the way that is not gone in a sharp turn …
 SLOWS = 2.5  # … and how fast that share changes, 1/s
@@ -185,7 +185,8 @@ class Walkers:
         self._waited = np.where(nearer, 0, self._waited + 1)
         fits = (off <= OFF) & (askew <= ASKEW)
         prepared = self.alpha >= READY if self.prepares else np.ones(len(off), dtype=bool)
-        late = self._waited >= (PATIENCE * self.fps if self.prepares else 1)
+        patience = np.where(self.alpha >= READY, PATIENCE, LONGEST_PATIENCE) * self.fps
+        late = self._waited >= (patience if self.prepares else 1)
         return np.flatnonzero(way & fits & ((prepared & (off <= CLOSE)) | late))
 
     def off(self) -> tuple[np.ndarray, np.ndarray]:
