@@ -16,9 +16,15 @@ from kumite.control import preparation as learning
 from kumite.control.preparation import build_process
 from kumite.errors import KumiteError
 from kumite.graph import Library, builtin_library, save_library
+from kumite.graph.preparing import Preparing
 from kumite.rotation import planar_compose, planar_inverse
 
 QUICK = gradual(places=16, batch=1)
+
+
+def prepared(library: Library) -> Preparing:
+    assert library.preparing is not None
+    return library.preparing
 
 
 @pytest.fixture(scope="module")
@@ -46,14 +52,14 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
 
 def test_every_core_that_moves_is_steered(library: Library):
     approach = approach_motions(library, steer=(0.0, 0.5, -0.5))
-    cores = library.preparing.hierarchy.cores
+    cores = prepared(library).hierarchy.cores
     stand, walk = cores.label.index("stand"), cores.label.index("walk")
     assert approach.steer[approach.core == stand].tolist() == [0.0]
     assert approach.steer[approach.core == walk].tolist() == [0.0, 0.5, -0.5]
     assert "walk left 28.6°" in approach.motions.names
     assert approach.motions.displacement.shape == (7, 5, 3)
     np.testing.assert_allclose(approach.motions.duration, cores.seconds[approach.core])
-    links = library.preparing.hierarchy.links
+    links = prepared(library).hierarchy.links
     for r, a in enumerate(approach.core):
         for c, b in enumerate(approach.core):
             assert approach.motions.follows[r, c] == links[a, b]
@@ -61,7 +67,7 @@ def test_every_core_that_moves_is_steered(library: Library):
 
 def test_a_steered_walk_is_the_walk_turned_frame_by_frame(library: Library):
     approach = approach_motions(library, steer=(0.0, 0.6))
-    cores, clips = library.preparing.hierarchy.cores, library.clips
+    cores, clips = prepared(library).hierarchy.cores, library.clips
     walk = cores.label.index("walk")
     start, stop = int(cores.start[walk]), int(cores.stop[walk])
     plain, steered = np.flatnonzero(approach.core == walk)

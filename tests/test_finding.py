@@ -17,12 +17,13 @@ from kumite.clip import LIMBS, Clip, ClipSet, concatenate
 from kumite.errors import KumiteError
 from kumite.export.bvh import write_bvh
 from kumite.graph import (
+    Library,
     build_preparation_library,
     find_targets,
     load_library,
     marked_targets,
 )
-from kumite.graph.preparing import KINDS
+from kumite.graph.preparing import KINDS, Preparing
 from kumite.performer import perform
 
 TAKES = ("duck_under", "jump_over", "front_kick")
@@ -58,6 +59,11 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
 
 def row(clip: str, start: int, stop: int, label: str, more: str = "") -> str:
     return f"{clip} {start} {stop} transition - forward {label} {more}".rstrip() + "\n"
+
+
+def prepared(library: Library) -> Preparing:
+    assert library.preparing is not None
+    return library.preparing
 
 
 # Found --------------------------------------------------------------------------------------------
@@ -218,13 +224,13 @@ def test_build_takes_marks_from_a_file(run, files: Path, tmp_path: Path):
     code, text, err = run(*build, "--alike", 1.0, "--threshold", 1e-9)
     assert code == 0, err
     library = load_library(tmp_path / "p.kumite")
-    assert library.preparing.hierarchy.targets.label == ("duck", "jump")
-    assert library.preparing.hierarchy.alike == 1.0 and library.report["threshold"] == 1e-9
+    assert prepared(library).hierarchy.targets.label == ("duck", "jump")
+    assert prepared(library).hierarchy.alike == 1.0 and library.report["threshold"] == 1e-9
     for t, label in enumerate(("duck", "jump")):
         fell_back = f"{label}: no frame fits, its first frame is taken" in text
-        assert fell_back == (not library.preparing.found[t])
+        assert fell_back == (not prepared(library).found[t])
         assert fell_back == (label in library.report["fall_back"])
-    assert not library.preparing.found.all()
+    assert not prepared(library).found.all()
 
 
 def test_build_for_preparation_is_refused(run, files: Path, tmp_path: Path):
@@ -254,7 +260,7 @@ def test_real_clips_are_built_by_themselves_and_from_a_file(run, mocap: Path, tm
     code, _, err = run("build", *sources, "-o", "p.kumite", "--level", "preparation")
     assert code == 0, err
     library = load_library(tmp_path / "p.kumite")
-    preparing, clips = library.preparing, library.clips
+    preparing, clips = prepared(library), library.clips
     targets = preparing.hierarchy.targets
     assert {"stand", "walk"} <= set(preparing.hierarchy.cores.label)
     kinds = {
@@ -277,7 +283,7 @@ def test_real_clips_are_built_by_themselves_and_from_a_file(run, mocap: Path, tm
         "build", *sources, "-o", "q.kumite", "--level", "preparation", "--actions", "a.txt"
     )
     assert code == 0, err
-    marked = load_library(tmp_path / "q.kumite").preparing
+    marked = prepared(load_library(tmp_path / "q.kumite"))
     assert marked.hierarchy.targets.label == ("crawl", "jump")
     assert [KINDS[k] for k in marked.kind] == ["under", "over"]
 
@@ -292,5 +298,5 @@ def test_a_boxers_targets_are_blows_and_ducks(mocap: Path):
         clip = clips.names[clips.clip_of_frame[targets.start[t]]]
         if clip in ("jab_left", "jab_right", "straight_right"):
             side = clip.split("_")[1]
-            assert label.startswith(f"{side}_hand_") and library.preparing.kind[t] == 0
+            assert label.startswith(f"{side}_hand_") and prepared(library).kind[t] == 0
     assert {"left_hand_straight", "right_hand_straight", "under"} <= set(targets.label)

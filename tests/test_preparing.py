@@ -38,6 +38,11 @@ ABOUT = {
 }
 
 
+def prepared(library: Library) -> Preparing:
+    assert library.preparing is not None
+    return library.preparing
+
+
 @pytest.fixture(scope="module")
 def library() -> Library:
     return builtin_library(None, style="targets", level="preparation")
@@ -45,8 +50,7 @@ def library() -> Library:
 
 @pytest.fixture(scope="module")
 def preparing(library: Library) -> Preparing:
-    assert library.preparing is not None
-    return library.preparing
+    return prepared(library)
 
 
 def skin(body: Body, clips: ClipSet, frames: slice, count: int) -> np.ndarray:
@@ -178,8 +182,8 @@ def test_a_sphere_that_rolls_by():
 
 def test_who_ducks_on_the_spot_passes_nothing(library):
     clips = library.clips
-    duck = library.preparing.hierarchy.targets.label.index("duck_under")
-    targets = library.preparing.hierarchy.targets
+    duck = prepared(library).hierarchy.targets.label.index("duck_under")
+    targets = prepared(library).hierarchy.targets
     start, mark = int(targets.start[duck]), int(targets.mark[duck])
     half = Targets(("half",), np.array([start]), np.array([mark + 25]), np.array([mark]))
     about = find_about(clips, library.strikes, half, 0, mark)
@@ -196,15 +200,15 @@ def test_a_library_is_read_as_it_was_written(library, tmp_path: Path):
     again = load_library(tmp_path / "a.kumite")
     assert again.digest == library.digest and again.report == library.report
     for f in fields(Preparing):
-        ours, theirs = getattr(library.preparing, f.name), getattr(again.preparing, f.name)
+        ours, theirs = getattr(prepared(library), f.name), getattr(prepared(again), f.name)
         if f.name != "hierarchy":
             np.testing.assert_array_equal(ours, theirs)
-    h = again.preparing.hierarchy
-    assert h.cores.label == library.preparing.hierarchy.cores.label
-    assert np.array_equal(h.links, library.preparing.hierarchy.links)
+    h = prepared(again).hierarchy
+    assert h.cores.label == prepared(library).hierarchy.cores.label
+    assert np.array_equal(h.links, prepared(library).hierarchy.links)
     save_library(tmp_path / "b.kumite", again)
     assert (tmp_path / "a.kumite").read_bytes() == (tmp_path / "b.kumite").read_bytes()
-    other = replace(library, preparing=replace(library.preparing, way=library.preparing.way + 0.1))
+    other = replace(library, preparing=replace(prepared(library), way=prepared(library).way + 0.1))
     assert other.digest != library.digest
 
 
@@ -242,16 +246,14 @@ def test_damaged_libraries(library, tmp_path: Path, name: str, wrong: float):
 
 
 def test_libraries_that_cannot_be_built(library):
-    clips, targets = library.clips, library.preparing.hierarchy.targets
+    clips, targets = library.clips, prepared(library).hierarchy.targets
     with pytest.raises(KumiteError, match="no target motion; expected at least one"):
         build_preparation_library(clips, Targets((), *[np.zeros(0)] * 3))
-    for wrong, text in (
-        ({"alike": 0.0}, "alike 0.0 rad"),
-        ({"alike": np.nan}, "alike nan rad"),
-        ({"threshold": -1.0}, "threshold -1.0 rad²"),
-    ):
+    for alike, text in ((0.0, "alike 0.0 rad"), (np.nan, "alike nan rad")):
         with pytest.raises(KumiteError, match=text):
-            build_preparation_library(clips, targets, **wrong)
+            build_preparation_library(clips, targets, alike=alike)
+    with pytest.raises(KumiteError, match=r"threshold -1\.0 rad²"):
+        build_preparation_library(clips, targets, threshold=-1.0)
     end = int(clips.clip_start[1])
     across = Targets(("x",), np.array([end - 50]), np.array([end + 50]), np.array([end]))
     with pytest.raises(KumiteError, match=r"target 'x': frames .* no part of one clip"):
@@ -261,18 +263,18 @@ def test_libraries_that_cannot_be_built(library):
 
 
 def test_a_target_that_falls_back_is_told(library):
-    clips, targets = library.clips, library.preparing.hierarchy.targets
+    clips, targets = library.clips, prepared(library).hierarchy.targets
     t = targets.label.index("jump_over")
-    air = int(library.preparing.contact[t])  # nothing supports who is in the air
+    air = int(prepared(library).contact[t])  # nothing supports who is in the air
     jump = Targets(("jump",), np.array([air - 1]), targets.stop[[t]], np.array([air]))
-    cores = library.preparing.hierarchy.cores
+    cores = prepared(library).hierarchy.cores
     built = build_preparation_library(clips, jump, cores, threshold=1e-9)
-    assert built.report["fall_back"] == ["jump"] and not built.preparing.found[0]
-    assert built.preparing.reference[0] == air - 1
+    assert built.report["fall_back"] == ["jump"] and not prepared(built).found[0]
+    assert prepared(built).reference[0] == air - 1
 
 
 def test_cores_may_be_given_or_found(library):
-    clips, targets = library.clips, library.preparing.hierarchy.targets
+    clips, targets = library.clips, prepared(library).hierarchy.targets
     contacts = find_contacts(clips)
     found = find_cycles(clips, contacts)
     walk = found.label.index("walk")
@@ -290,6 +292,6 @@ def test_authored_targets_at_another_rate():
     built = build_preparation_library(clips, authored_targets(clips, made.truth, 60.0))
     told = {
         label: KINDS[k]
-        for label, k in zip(built.preparing.hierarchy.targets.label, built.preparing.kind)
+        for label, k in zip(prepared(built).hierarchy.targets.label, prepared(built).kind)
     }
     assert told == ABOUT
