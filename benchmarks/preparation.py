@@ -19,27 +19,11 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from tests.preparation_twin import Exact, four_cores
 
-from kumite.control.preparation import Curve, PreparationSettings, gradual, train
+from kumite.control.preparation import PreparationSettings, gradual, train
+from kumite.export.plot import plot_learning
 
 SEEDS = range(3)
 MOST_BATCHES = 100
-
-
-def draw(path: str, curves: dict[str, Curve]) -> None:
-    import matplotlib
-
-    matplotlib.use("agg")
-    from matplotlib import pyplot
-
-    figure, axes = pyplot.subplots(1, 2, figsize=(11, 4), constrained_layout=True)
-    for name, curve in curves.items():
-        axes[0].plot(np.arange(1, len(curve) + 1), 100 * curve.changed, label=name)
-        axes[1].plot(np.arange(1, len(curve) + 1), curve.mean_return, label=name)
-    axes[0].axhline(2.0, color="black", linewidth=0.8)
-    axes[0].set(xlabel="batch", ylabel="states changed [%]", yscale="log")
-    axes[1].set(xlabel="batch", ylabel="return of an episode, mean")
-    axes[1].legend()
-    figure.savefig(path, dpi=110)
 
 
 def main(path: str | None = None) -> None:
@@ -74,7 +58,7 @@ def main(path: str | None = None) -> None:
                     f"{curve.motion_seconds[b]:.1f} |"
                 )
     if path:
-        draw(path, curves)
+        plot_learning(path, curves, paper.changed)
 
 
 if __name__ == "__main__":

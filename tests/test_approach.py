@@ -51,13 +51,14 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
 
 
 def test_every_core_that_moves_is_steered(library: Library):
-    approach = approach_motions(library, steer=(0.0, 0.5, -0.5))
+    approach = approach_motions(library, steer=(0.0, 0.5, -0.5), gaits=("run", "walk"))
     cores = prepared(library).hierarchy.cores
     stand, walk = cores.label.index("stand"), cores.label.index("walk")
-    assert approach.steer[approach.core == stand].tolist() == [0.0]
+    assert stand not in approach.core  # nobody gets anywhere by standing
+    assert set(approach_motions(library).core) == {walk}
     assert approach.steer[approach.core == walk].tolist() == [0.0, 0.5, -0.5]
     assert "walk left 28.6°" in approach.motions.names
-    assert approach.motions.displacement.shape == (7, 5, 3)
+    assert approach.motions.displacement.shape == (6, 5, 3)
     np.testing.assert_allclose(approach.motions.duration, cores.seconds[approach.core])
     links = prepared(library).hierarchy.links
     for r, a in enumerate(approach.core):
@@ -87,12 +88,14 @@ def test_a_steered_walk_is_the_walk_turned_frame_by_frame(library: Library):
 
 
 def test_without_steering_goals_behind_are_out_of_reach(library: Library):
-    with pytest.raises(KumiteError, match="the goal cannot be reached from 12 of 32 cells"):
+    with pytest.raises(KumiteError, match="the goal cannot be reached from 16 of 32 cells"):
         build_process(approach_motions(library, steer=(0.0,)).motions, gradual())
     build_process(approach_motions(library).motions, gradual())
 
 
 def test_motions_that_cannot_be(library: Library, fighters: Library):
+    with pytest.raises(KumiteError, match=r"unknown gait 'stand'.*run, walk"):
+        approach_motions(library, gaits=("stand",))
     with pytest.raises(KumiteError, match="holds no target motions; expected one for preparation"):
         approach_motions(fighters)
     for wrong in ((), (2.0,), (float("nan"),)):
@@ -143,13 +146,13 @@ def test_train_learns_keeps_and_goes_on(run, library, tmp_path: Path, monkeypatc
     save_library(path, library)
     code, text, err = run("train", path, "--most-batches", 3, "--seed", 201)
     assert code == 0, err
-    assert "11 motions: run, run left 22.9°" in text
+    assert "5 motions: walk, walk left 22.9°" in text
     assert "stopped unsettled after 3 batches" in text and "batch 2" in err
     assert "--most-batches" in err
     code, text, _ = run("train", path, "--most-batches", 3, "--seed", 201, "--json")
     told = json.loads(text)
     assert code == 0 and told["batches"] == 3 and not told["converged"]
-    assert len(told["motions"]) == 11 and told["folder"] == f"{path}.cache"
+    assert len(told["motions"]) == 5 and told["folder"] == f"{path}.cache"
     assert 0 < told["curve"]["changed"][2] < told["curve"]["changed"][0] <= 1
 
     batch = learning.Learning.batch

@@ -30,7 +30,7 @@ def train(
     ] = None,
     gait: Annotated[
         list[str] | None,
-        typer.Option(help="A core to go with; may be repeated (default: all that go somewhere)."),
+        typer.Option(help="A core to go with; may be repeated (default: walks of any kind)."),
     ] = None,
     legs: Annotated[
         float, typer.Option(min=0.01, help="C of root and legs, by which steps get shorter.")
@@ -42,13 +42,19 @@ def train(
     most_batches: Annotated[
         int, typer.Option(min=1, help="Batches of episodes after which learning stops.")
     ] = 1000,
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw the learning curve: .png, .svg or .pdf.")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Learn how to approach a goal and prepare on the way. Ctrl-C keeps what is learned."""
     from kumite.control import PreparationSettings, cache_folder, gradual
     from kumite.control.approaching import STEER, trained_approach
+    from kumite.files import refuse_unwritable
     from kumite.graph import builtin_library, load_library
 
+    if plot is not None:
+        refuse_unwritable(plot)  # before the work, not after
     settings = PreparationSettings() if printed else gradual()
     folder = cache_folder(library)
     turns = STEER if steer is None else tuple(np.radians(steer).tolist())
@@ -88,6 +94,10 @@ def train(
             )
             raise typer.Exit(INTERRUPTED) from None
     curve, motions = policy.curve, approach.motions
+    if plot is not None:
+        from kumite.export.plot import plot_learning
+
+        plot_learning(plot, {found.report.get("level", "learning"): curve}, settings.changed)
     if as_json:
         print_json(
             {
@@ -119,6 +129,7 @@ def train(
             for b in _some(len(curve))
         ),
         f"kept in {folder}",
+        *([f"wrote {plot}"] if plot is not None else []),
     ]
     for line in lines:
         out.print(line, markup=False, highlight=False)

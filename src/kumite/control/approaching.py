@@ -28,6 +28,7 @@ from kumite.synthesis.preparation import LEGS
 
 STEER = (0.0, 0.4, -0.4, 0.8, -0.8)  # rad over a cycle
 STEEREST = 1.6  # rad: farther no foot follows within a cycle
+WALK = "walk"  # how the labels of walks begin
 MOVES = 0.15  # m/s: who is slower stands
 
 
@@ -60,8 +61,9 @@ def approach_motions(
     """The cores of a library for preparation that go somewhere, each once with every ``steer``.
 
     steer [rad]: extra turns over a cycle, to the left; at a level of preparation they shrink as the
-    way does. gaits: labels of the cores to take; None: all that go somewhere. (Who may stand on the
-    way learns to stay where its goal is hard to reach.) curve: C of the root. A motion follows
+    way does. gaits: labels of the cores to take; None: walks of any kind, or where there are none
+    all that go somewhere. (Who runs steps over places; who may stand on the way learns to stay
+    where its goal is hard to reach.) curve: C of the root. A motion follows
     another where the hierarchy links their cores. settings: whose levels may be chosen,
     :func:`gradual` by default. Errors: another kind of library; gaits that it does not have or that
     stand; turns that are none, too large, or given twice.
@@ -86,7 +88,9 @@ def approach_motions(
     for gait in gaits or ():
         if gait not in known:
             raise unknown("gait", gait, known)
-    rows = [(c, s) for c in moves if gaits is None or cores.label[c] in gaits for s in turns]
+    walks = [c for c in moves if cores.label[c].startswith(WALK)] or moves
+    taken = walks if gaits is None else [c for c in moves if cores.label[c] in gaits]
+    rows = [(c, s) for c in taken for s in turns]
     if not rows:
         raise KumiteError("the library's cores go nowhere: nothing can be approached with them")
     core = np.array([c for c, _ in rows], dtype=np.int64)

@@ -81,7 +81,7 @@ class PrepareSettings(Settings):
     library: Literal["targets"] = "targets"  # the performer's style
     preparation: Literal["ours", "linear", "none"] = "ours"
     automatic: bool = True  # goes, and launches what is to be done, by itself
-    gaits: tuple[Name, ...] = ("walk",)  # cores to go with; none: all that go somewhere
+    gaits: tuple[Name, ...] = ()  # cores to go with; none: walks of any kind
     curve: Curve = Field(default_factory=dict)  # C by joint, role, "legs" or "upper"
     curves: dict[Name, Curve] = Field(default_factory=dict)  # the same, of target motions by label
 
