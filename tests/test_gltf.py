@@ -134,6 +134,27 @@ def test_a_box_is_a_car_that_points_its_way(recording: Recording, tmp_path: Path
     assert np.allclose(at, [2.0 * np.sin(yaw), 0.0, 2.0 * np.cos(yaw)], atol=1e-4)
 
 
+def test_a_box_without_wheels_is_a_plain_box(recording: Recording, tmp_path: Path):
+    size, yaw = np.array([2.4, 0.06, 0.3]), 0.7
+    told = {"object_size": {"ball": size.tolist()}, "object_yaw": {"ball": yaw}}
+    write_glb(tmp_path / "bar.glb", replace(recording, settings={**told, "object_wheels": []}))
+    document, binary = parse(tmp_path / "bar.glb")
+    (n,) = (n for n, node in enumerate(document["nodes"]) if node["name"] == "ball")
+    (part,) = document["meshes"][document["nodes"][n]["mesh"]]["primitives"]
+    own = read(document, binary, part["attributes"]["POSITION"]).astype(float)
+    assert np.allclose(np.unique(own, axis=0), np.unique(0.5 * size * np.sign(own), axis=0))
+    assert len(np.unique(own, axis=0)) == 8
+    triangles = own[read(document, binary, part["indices"]).reshape(-1, 3)]
+    a, b, c = triangles.transpose(1, 0, 2)
+    # Closed, and turned outwards: the volume below its triangles is the box's.
+    assert np.sum(np.cross(a, b) * c) / 6 == pytest.approx(size.prod(), rel=1e-5)
+    normals = read(document, binary, part["attributes"]["NORMAL"])
+    assert np.allclose(np.sum(normals * own, axis=1), np.abs(normals) @ (0.5 * size), atol=1e-6)
+    end = (worlds(document, binary, 7)[n] @ [1.2, 0.0, 0.0, 1.0])[:3]
+    at = end - recording.object_position[7, 0]
+    assert np.allclose(at, [1.2 * np.cos(yaw), 0.0, -1.2 * np.sin(yaw)], atol=1e-4)
+
+
 def test_joints_and_skin_are_where_ours_are(recording: Recording, written: Path):
     document, binary = parse(written)
     mesh = body_mesh(recording.skeleton)

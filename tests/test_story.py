@@ -262,6 +262,7 @@ def test_a_recording_shows_the_vehicle_wherever_objects_are_shown(actions: Libra
     play = Playback(recording)
     (thing,) = play.objects
     assert (thing.name, thing.size, thing.draggable) == ("car", (2.0, 1.0, 4.0), False)
+    assert thing.wheels and recording.settings["object_wheels"] == ["car"]
     assert thing.yaw == pytest.approx(0.0)
     assert np.allclose(thing.position, [5.0, 0.5, -6.0], atol=1e-5)
     play.seek(len(recording) - 1)

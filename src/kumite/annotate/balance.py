@@ -62,11 +62,19 @@ def find_balance(clips: ClipSet, contacts: Contacts, body: Body | None = None) -
         )
     position, world = clips.world
     centre = centre_of_mass(body or lay_body(clips.skeleton), position, world)
-    at = sole_corners(clips.skeleton, position, world)
-    low = at[..., 1].min(axis=2, keepdims=True)
-    touches = contacts.on_ground[:, :, None] & (at[..., 1] <= low + RAISED)
-    corner = np.ascontiguousarray(at[..., [0, 2]])
+    corner, touches = support(clips.skeleton, position, world, contacts.on_ground)
     return Balance(centre, corner, touches, support_distance(corner, touches, centre[:, [0, 2]]))
+
+
+def support(
+    skeleton: Skeleton, position: np.ndarray, world_wxyz: np.ndarray, on_ground: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Corners [F, 2, 6, 2] m of the soles in poses, x and z, and which of them [F, 2, 6] touch the
+    ground. on_ground [F, 2]: feet that stand. Errors: roles that are missing."""
+    at = sole_corners(skeleton, position, world_wxyz)
+    low = at[..., 1].min(axis=2, keepdims=True)
+    touches = on_ground[:, :, None] & (at[..., 1] <= low + RAISED)
+    return np.ascontiguousarray(at[..., [0, 2]]), touches
 
 
 def centre_of_mass(body: Body, position: np.ndarray, world_wxyz: np.ndarray) -> np.ndarray:

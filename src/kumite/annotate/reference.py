@@ -50,9 +50,14 @@ class Reference:
         )
 
     def __str__(self) -> str:
-        if self.found:
-            return f"frame {self.frame}, {self.mark - self.frame} before the mark"
-        return f"frame {self.frame}, the start: no frame up to the mark fits"
+        return where_found(self.frame, self.mark, self.found)
+
+
+def where_found(frame: int, mark: int, found: bool) -> str:
+    """Which frame a reference posture is, in words. found: as of :class:`Reference`."""
+    if found:
+        return f"frame {frame}, {mark - frame} before the mark"
+    return f"frame {frame}, the start: no frame up to the mark fits"
 
 
 def find_reference(

@@ -272,7 +272,7 @@ def _unit(xyzw: np.ndarray) -> list[float]:
 
 
 def _add_objects(document: _Document, recording: Recording) -> None:
-    """Balls, which share one unit sphere, boxes, each a car, and lines."""
+    """Balls, which share one unit sphere, boxes, cars and lines."""
     sphere = None
     for o, thing in enumerate(recorded_objects(recording)):
         if parts := shown(thing):

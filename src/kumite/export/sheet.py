@@ -217,7 +217,7 @@ def ball(centre: np.ndarray, radius: float, colour: np.ndarray = OBJECT_COLOUR) 
 
 
 def object_shapes(thing: SceneObject, centre: np.ndarray) -> list[Shape]:
-    """A ball, of a box a car, or a line, with its middle at a place [3] m."""
+    """A ball, a box, a car or a line, with its middle at a place [3] m."""
     parts = shown(thing)
     if not parts:
         return [ball(centre, thing.radius)]

@@ -1,4 +1,4 @@
-"""What a box on the stage looks like, a car, and what the edge of an arena."""
+"""What a box on the stage looks like, what a car, and what the edge of an arena."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ PAINT = (0.30, 0.34, 0.40)  # sRGB
 GLASS = (0.12, 0.15, 0.19)
 TYRE = (0.06, 0.06, 0.07)
 CHALK = (0.80, 0.80, 0.76)
+WOOD = (0.72, 0.53, 0.31)
 WHEEL_SIDES = 16
 LINE_WIDTH = 0.06  # m, of an arena's edge
 LINE_SIDES = 96
@@ -33,7 +34,16 @@ def shown(thing: SceneObject) -> tuple[Part, ...]:
     """What a thing looks like; a ball is no parts."""
     if thing.line:
         return (line(thing.radius),)
-    return () if thing.size is None else car(thing.size)
+    if thing.size is None:
+        return ()
+    return car(thing.size) if thing.wheels else (box(thing.size),)
+
+
+def box(size: tuple[float, float, float]) -> Part:
+    """A plain box of this width, height and length [m]: a bar, a post."""
+    width, height, length = size
+    corners = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+    return _part("wood", WOOD, [_prism(corners * [height, length], -0.5 * width, 0.5 * width)])
 
 
 def line(radius: float) -> Part:

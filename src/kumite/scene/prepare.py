@@ -22,7 +22,7 @@ from kumite.scene.memory import refuse_too_many
 from kumite.scene.recording import Event
 from kumite.scene.stage import SceneObject
 from kumite.scene.things import STRIKE, Things
-from kumite.scene.walkers import NOTHING, ON_THE_WAY, Walkers
+from kumite.scene.walkers import ARRIVED, NOTHING, ON_THE_WAY, Walkers
 from kumite.synthesis.preparation import curves
 
 NOBODY = NO_THING = -1
@@ -37,6 +37,7 @@ NOTICED = 4.0  # m within which a thing ahead is prepared for by who is led by h
 AHEAD = np.radians(75)  # … so far to either side
 BEHIND = 1.5  # m that an opponent behind counts as farther away than one ahead
 WATCHED = 0.15  # s over which it is seen how opponents move
+PATIENCE = 5.0  # s without getting nearer to where the hand sent it, then it goes its own way
 
 
 class PrepareScene:
@@ -140,6 +141,8 @@ class PrepareScene:
         self.thing = np.full(count, NO_THING)  # what each goes to
         self.foe = np.full(count, NOBODY)  # or whom at
         self.told = np.full((count, 2), np.nan)  # m: or where, by hand
+        self._nearest = np.full(count, np.inf)  # m that it has come to there …
+        self._nearer_at = np.zeros(count, dtype=np.int64)  # … in this frame
         self.turn = np.zeros(count, dtype=np.int64)  # how far each is in its course
         self.flees = np.zeros(count, dtype=np.int64)  # frame until which an opponent keeps away
         self.to_do = np.full(count, NOTHING)  # the motion to be done at a foe
@@ -177,7 +180,8 @@ class PrepareScene:
 
     def go(self, k: int, place: np.ndarray) -> np.ndarray:
         """Send walker k to a place [2] m of the ground; where it really goes: out of an obstacle to
-        the nearer side of it.
+        the nearer side of it. Who goes by itself does so again when it is there, or has not come
+        nearer for 5 s; so does who has opponents.
         """
         place = np.array(place, dtype=np.float64)
         if not np.all(np.isfinite(place)):
@@ -190,6 +194,7 @@ class PrepareScene:
             place = place + ((0.6 if along >= 0 else -0.6) - along) * way
             self._event("moved goal", k, thing=self.things.names[within])
         self.told[k], self.thing[k] = place, NO_THING
+        self._nearest[k], self._nearer_at[k] = np.inf, self.frame
         self.walkers.decide_anew(np.array([k]))
         return place
 
@@ -198,6 +203,11 @@ class PrepareScene:
         if name not in self.things.names:
             raise unknown("thing", name, self.things.names)
         self.thing[k], self.told[k] = self.things.names.index(name), np.nan
+        self.walkers.decide_anew(np.array([k]))
+
+    def let_go(self, k: int) -> None:
+        """Walker k is no longer sent anywhere: it stays, or goes by itself."""
+        self.thing[k], self.told[k] = NO_THING, np.nan
         self.walkers.decide_anew(np.array([k]))
 
     def trigger(self, k: int, motion: str) -> bool:
@@ -233,6 +243,8 @@ class PrepareScene:
     def _assign(self) -> None:
         """Who goes where by itself."""
         w, things = self.walkers, self.things
+        if self.automatic or self.settings.opponents:
+            self._hand_back()
         if self.settings.opponents:
             self._assign_foes()
         if not self.automatic or len(things) == 0:
@@ -248,6 +260,18 @@ class PrepareScene:
                     self.thing[k] = int(np.argmin(away))
             w.decide_anew(np.array([k]))
 
+    def _hand_back(self) -> None:
+        """Who has come to where the hand sent it, or comes no nearer, is led no longer."""
+        w = self.walkers
+        led = np.flatnonzero(np.isfinite(self.told[:, 0]))
+        away = np.hypot(*(self.told[led] - w.facing[led, :2]).T)
+        nearer = (away < self._nearest[led] - 0.05) | (w.doing[led] != ON_THE_WAY)
+        self._nearer_at[led[nearer]] = self.frame
+        self._nearest[led] = np.minimum(self._nearest[led], away)
+        stuck = self.frame - self._nearer_at[led] > PATIENCE * self.fps
+        for k in led[(away < ARRIVED) | stuck].tolist():
+            self.let_go(k)
+
     def _assign_foes(self) -> None:
         """Walkers turn to the nearest opponent that does not keep away, opponents to walkers."""
         w, foes = self.walkers, np.arange(self.users, len(self.names))
@@ -256,7 +280,7 @@ class PrepareScene:
             if w.doing[k] != ON_THE_WAY:
                 continue
             near = NOBODY
-            if len(come) and np.isnan(self.told[k, 0]):
+            if len(come):
                 away, aside = seen(np.tile(w.facing[k], (len(come), 1)), w.facing[come, :2])
                 away += BEHIND * np.abs(aside) / np.pi
                 if self.foe[k] in come:  # nobody turns to and fro between two who are equally near
@@ -420,8 +444,10 @@ class PrepareScene:
     def _next(self, k: int) -> None:
         """Walker k has done what was to be done at its thing: on to the next."""
         if self.thing[k] != NO_THING:
+            course = self._course[k] if k < self.users else ()
+            # What it was sent to by hand is not its turn.
+            self.turn[k] += bool(course and self.thing[k] == course[self.turn[k] % len(course)])
             self.thing[k] = NO_THING
-            self.turn[k] += 1
         self.to_do[k], self.foe[k] = NOTHING, NOBODY
 
     def _finish(self, k: int) -> None:

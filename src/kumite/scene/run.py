@@ -81,6 +81,7 @@ def record(
             "object_yaw": {o.name: o.yaw for o in scene.objects if o.size is not None},
             "object_line": [o.name for o in scene.objects if o.line],
             "object_thrown": [o.name for o in scene.objects if o.thrown],
+            "object_wheels": [o.name for o in scene.objects if o.wheels],
             "aims_at": scene.settings.aims,
             **({"unarmed": list(unarmed)} if (unarmed := getattr(scene, "unarmed", ())) else {}),
             "scene": scene.settings.model_dump(mode="json"),

@@ -29,6 +29,7 @@ class SceneObject:
     yaw: float = 0.0  # rad, the way a box's length points
     line: bool = False  # round, of that radius
     thrown: bool = False  # comes and goes: nobody looks for it
+    wheels: bool = False  # a box that is a car
 
 
 def recorded_objects(recording: Recording) -> list[SceneObject]:
@@ -36,6 +37,7 @@ def recorded_objects(recording: Recording) -> list[SceneObject]:
     told = recording.settings
     radii, sizes = told.get("object_radius", {}), told.get("object_size", {})
     yaws = told.get("object_yaw", {})
+    wheels = told.get("object_wheels", sizes)  # boxes were all cars before it was told
     return [
         SceneObject(
             name,
@@ -45,6 +47,7 @@ def recorded_objects(recording: Recording) -> list[SceneObject]:
             yaw=float(yaws.get(name, 0.0)),
             line=name in told.get("object_line", ()),
             thrown=name in told.get("object_thrown", ()),
+            wheels=name in wheels,
         )
         for o, name in enumerate(recording.objects)
     ]

@@ -168,7 +168,12 @@ class Vehicle:
         self._struck: set[int] = set()
         width, height, length = settings.size
         self.body = SceneObject(
-            settings.name, self._middle(), 0.5 * length, size=(width, height, length), yaw=self.yaw
+            settings.name,
+            self._middle(),
+            0.5 * length,
+            size=(width, height, length),
+            yaw=self.yaw,
+            wheels=True,
         )
 
     def _middle(self) -> np.ndarray:

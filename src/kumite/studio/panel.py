@@ -13,9 +13,12 @@ from kumite.scene.bout import BoutScene
 from kumite.studio.action_list import ActionList
 from kumite.studio.direction import Direction, Director
 from kumite.studio.dodging import Dodging, Thrower
+from kumite.studio.leading import Leader
 from kumite.studio.paths import Sketch
+from kumite.studio.reference import Prepared
 from kumite.studio.throwing import Throws
 from kumite.studio.volumes import Volumes
+from kumite.studio.walking import Walking
 from kumite.studio.wording import EventLog, lines_html, score_html
 
 SLOWEST, FASTEST = 0.1, 4.0
@@ -94,6 +97,8 @@ class Panel:
         sketch: Sketch | None = None,
         throws: Throws | None = None,
         volumes: Volumes | None = None,
+        leader: Leader | None = None,
+        prepared: Prepared | None = None,
     ) -> None:
         self._fps = fps
         self._shown: dict[str, Any] = {}
@@ -131,6 +136,9 @@ class Panel:
         self._dodging: Dodging | None = None
         if throws is not None and volumes is not None:
             self._dodging = Dodging(server, throws, volumes, desk, _safely)
+        self._walking: Walking | None = None
+        if leader is not None and prepared is not None:
+            self._walking = Walking(server, leader, prepared, desk, _safely)
         self._direction: Direction | None = None
         if fight is not None and sketch is not None:
             with gui.add_folder("Direction"):
@@ -182,6 +190,8 @@ class Panel:
             self._direction.show()
         if self._dodging is not None:
             self._dodging.show()
+        if self._walking is not None:
+            self._walking.show()
         for name, handle, content in (
             ("clock", self._clock, clock),
             ("score", self._score, score_html(log)),

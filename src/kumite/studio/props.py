@@ -22,8 +22,8 @@ SETTLE_HALFLIFE = 0.4  # s; the handle rests where the object hangs, not where i
 
 
 class Targets:
-    """A sphere, car or line for every object, and a gizmo at each one that can be dragged. What is
-    far below the ground is hidden.
+    """A sphere, box, car or line for every object, and a gizmo at each one that can be dragged.
+    What is far below the ground is hidden.
     """
 
     def __init__(

@@ -16,6 +16,7 @@ EYE_HEIGHT = 1.45  # m
 LOOK_HEIGHT = 0.95  # m
 BACK, FARTHEST = 6.5, 20.0  # m from people at whom things are thrown, at least and at most
 ASIDE = 0.5  # rad off straight before them
+FARTHEST_BEHIND, BEHIND_HEIGHT = 10.0, 2.6  # m from who walks about, and above the floor
 FOLLOW_HALFLIFE = 0.35  # s for the stage to make up half the way to the fighters' midpoint
 
 
@@ -85,8 +86,23 @@ def aim_at(server: viser.ViserServer, points: np.ndarray, yaw: float, centre: np
     _look_from(server, distance * np.array([np.sin(yaw + ASIDE), np.cos(yaw + ASIDE)]), reach)
 
 
-def _look_from(server: viser.ViserServer, eye: np.ndarray, reach: float) -> None:
-    lift = EYE_HEIGHT + 0.35 * max(reach - 2.0, 0.0)  # a crowd is seen from above
+def aim_behind(
+    server: viser.ViserServer, points: np.ndarray, yaw: float, centre: np.ndarray
+) -> None:
+    """The camera of a page that shows people on their way among ``points`` [N, 3] m, the first of
+    whom faces ``yaw`` [rad]: from behind and above, so that the floor can be pointed at. It does
+    not go back as far as would show all of a long way.
+    """
+    reach = float(np.linalg.norm(points[:, [0, 2]] - centre, axis=1).max())
+    distance = np.clip((reach + 0.75) / np.tan(FOV / 2), BACK, FARTHEST_BEHIND)
+    way = -np.array([np.sin(yaw + ASIDE), np.cos(yaw + ASIDE)])
+    _look_from(server, distance * way, 0.0, BEHIND_HEIGHT)
+
+
+def _look_from(
+    server: viser.ViserServer, eye: np.ndarray, reach: float, height: float = EYE_HEIGHT
+) -> None:
+    lift = height + 0.35 * max(reach - 2.0, 0.0)  # a crowd is seen from above
     camera = server.initial_camera
     camera.fov = FOV
     camera.near = 0.05

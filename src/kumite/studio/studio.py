@@ -24,16 +24,19 @@ from kumite.errors import KumiteError
 from kumite.scene.actions import ActionPlayback
 from kumite.scene.bout import BoutScene
 from kumite.scene.dodge import DodgeScene
+from kumite.scene.prepare import PrepareScene
 from kumite.scene.recording import Event
 from kumite.scene.stage import Playback, Stage, in_sight
 from kumite.studio import bodies, props, ring
+from kumite.studio.leading import Leader
 from kumite.studio.pace import Pace
 from kumite.studio.panel import FASTEST, SLOWEST, Control, Panel
 from kumite.studio.paths import Path, Paths, Sketch, on_floor, sketched
+from kumite.studio.reference import Prepared, PreparedPicture
 from kumite.studio.server import close_server, is_loopback, open_server, url_of
 from kumite.studio.throwing import Throws
 from kumite.studio.volumes import VolumePicture, Volumes
-from kumite.studio.wording import LANDED, EventLog, is_dodging, place, struck
+from kumite.studio.wording import LANDED, EventLog, is_dodging, is_preparing, place, struck
 
 MOST_DRAWN = 60.0  # pictures a second
 PANEL_PERIOD = 0.2  # s between updates of what is read, not watched
@@ -54,6 +57,7 @@ class _Picture:
     note: str = ""  # behind the time
     paths: list[Path] = field(default_factory=list)  # of whom is sent along check points
     volumes: VolumePicture | None = None
+    prepared: PreparedPicture | None = None
 
 
 class Studio:
@@ -80,7 +84,7 @@ class Studio:
         self._ended = False
         self._hits: list[Event] = []
         self._pace = Pace(stage.fps)
-        self._log = EventLog(stage.names, dodging=is_dodging(stage))
+        self._log = EventLog(stage.names, dodging=is_dodging(stage), preparing=is_preparing(stage))
         mesh = body_mesh(stage.skeleton)
         self.server = open_server(host, port, stage.title, strict=strict_port)
         self.url = url_of(host, self.server.get_port())
@@ -102,6 +106,8 @@ class Studio:
         dodge = stage if isinstance(stage, DodgeScene) else None
         self._throws = None if dodge is None else Throws(dodge)
         self._volumes = None if dodge is None else Volumes(server, dodge)
+        self._walk = stage if isinstance(stage, PrepareScene) else None
+        self._prepared = None if self._walk is None else Prepared(server, self._walk, mesh)
         self._sketch = Sketch()
         self._paths = Paths(server, self._move_check_point)
         self._panel = Panel(
@@ -117,14 +123,19 @@ class Studio:
             sketch=self._sketch,
             throws=self._throws,
             volumes=self._volumes,
+            leader=None if self._walk is None else Leader(self._walk),
+            prepared=self._prepared,
         )
         picture = self._look()
         self._follow.jump(self._midpoint(picture))
-        if dodge is None:
-            ring.aim(server, self._in_view(picture), self._follow.centre)
-        else:
+        if dodge is not None:
             before = float(dodge.cast.facing[0, 2])
             ring.aim_at(server, picture.root_position, before, self._follow.centre)
+        elif self._walk is not None:
+            yaw = float(self._walk.walkers.facing[0, 2])
+            ring.aim_behind(server, self._in_view(picture), yaw, self._follow.centre)
+        else:
+            ring.aim(server, self._in_view(picture), self._follow.centre)
         self._drawn_at = self._panel_at = time.perf_counter()
         with server.atomic():
             self._draw(picture, 0.0)
@@ -324,6 +335,7 @@ class Studio:
             f" · frame {stage.clip_frame} of its clip" if isinstance(stage, ActionPlayback) else "",
             self._routes(),
             None if self._volumes is None else self._volumes.look(),
+            None if self._prepared is None else self._prepared.look(),
         )
 
     def _routes(self) -> list[Path]:
@@ -348,6 +360,8 @@ class Studio:
         self._targets.draw(picture.objects, picture.radii, seconds)
         if self._volumes is not None and picture.volumes is not None:
             self._volumes.draw(picture.volumes)
+        if self._prepared is not None and picture.prepared is not None:
+            self._prepared.draw(picture.prepared)
         self._paths.draw(picture.paths)
         self._animating = self._bursts.draw(seconds)
         now = time.perf_counter()
@@ -365,7 +379,10 @@ class Studio:
         return np.concatenate([picture.root_position, picture.objects[there]])
 
     def _midpoint(self, picture: _Picture) -> np.ndarray:
-        """The middle [2] (x, z) of what goes on: of the fighters, or of one and the target."""
+        """The middle [2] (x, z) of what goes on: of the fighters, or of one and the target; of who
+        walks about."""
+        if self._walk is not None:
+            return picture.root_position[: self._walk.users, [0, 2]].mean(axis=0)
         points = picture.root_position
         points = points if len(points) > 1 else self._in_view(picture)
         return points[:, [0, 2]].mean(axis=0)

@@ -8,8 +8,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from kumite.scene.dodge import DodgeScene
+from kumite.scene.prepare import PrepareScene
 from kumite.scene.recording import Event
 from kumite.scene.stage import Playback, Stage
+from kumite.scene.walkers import OFF
 from kumite.studio import palette
 
 LINES = 12  # events on the panel
@@ -26,6 +28,11 @@ MARKS = {
     "avoided": "↷",
     "struck": "●",
     "stale": "×",
+    "launch": "▸",
+    "done": "✓",
+    "passed": "↷",
+    "touched": "×",
+    "moved goal": "→",
 }
 SAID = {
     "found": "avoids it",
@@ -82,8 +89,8 @@ def describe(event: Event) -> str:
         if data.get("blocked"):
             said += ", blocked"
         return said
-    if event.kind in DODGING:
-        return DODGING[event.kind](data)
+    if event.kind in TOLD:
+        return TOLD[event.kind](data)
     rest = [
         _number(v) if k in ("action", "label", "name", "kind") else f"{_words(k)} {_number(v)}"
         for k, v in data.items()
@@ -140,6 +147,57 @@ DODGING = {
 """How what happens to those at whom balls are thrown is said."""
 
 
+def _launched(data: Mapping[str, Any]) -> str:
+    """How well prepared a motion was begun, how soon it meets something, and how far it is bent."""
+    said = _words(data.get("motion", "motion"))
+    if "level" in data:
+        said += f", prepared to {data['level']:.2f}"
+    if "apart_deg" in data:
+        said += f", {data['apart_deg']:.1f}° from its posture"
+    if "to_contact" in data:
+        said += f"; contact in {data['to_contact']:.2f} s"
+    if (off := data.get("bent")) is not None:
+        said += f", bent by {100 * off:.0f} cm" if off <= OFF else f", {off:.1f} m off: not bent"
+    return said
+
+
+def _done(data: Mapping[str, Any]) -> str:
+    return f"{_words(data.get('motion', 'motion'))} is done"
+
+
+def _passed(data: Mapping[str, Any]) -> str:
+    clearance = 100 * float(data.get("clearance", 0.0))
+    how = f"{clearance:.0f} cm clear" if clearance >= 0 else f"{-clearance:.0f} cm too near"
+    return f"{_words(data.get('thing', 'obstacle'))} is passed, {how}"
+
+
+def _touched(data: Mapping[str, Any]) -> str:
+    return f"{_words(data.get('part', 'body'))} touches {_words(data.get('thing', 'obstacle'))}"
+
+
+def _moved(data: Mapping[str, Any]) -> str:
+    return f"cannot stand in {_words(data.get('thing', 'an obstacle'))}: goes beside it"
+
+
+PREPARING = {
+    "launch": _launched,
+    "done": _done,
+    "passed": _passed,
+    "touched": _touched,
+    "moved goal": _moved,
+}
+"""How what happens to those who prepare is said."""
+
+TOLD = {**DODGING, **PREPARING}
+
+
+def is_preparing(stage: Stage) -> bool:
+    """Whether those on a stage prepare for what they do: in a recording, whether one did."""
+    if isinstance(stage, Playback):
+        return any(e.kind == "launch" for e in stage.recording.events)
+    return isinstance(stage, PrepareScene)
+
+
 def is_dodging(stage: Stage) -> bool:
     """Whether balls are thrown at those on a stage: in a recording, whether one was."""
     if isinstance(stage, Playback):
@@ -150,11 +208,14 @@ def is_dodging(stage: Stage) -> bool:
 class EventLog:
     """The stage's events as the panel shows them: new ones once, scores, the last few lines.
 
-    dodging: what counts is how many balls were thrown at whom, and how many struck.
+    dodging: what counts is how many balls were thrown at whom, and how many struck. preparing: how
+    many motions were done, what they hit and what was touched.
     """
 
-    def __init__(self, names: Sequence[str], *, dodging: bool = False) -> None:
-        self.names, self.dodging = tuple(names), dodging
+    def __init__(
+        self, names: Sequence[str], *, dodging: bool = False, preparing: bool = False
+    ) -> None:
+        self.names, self.dodging, self.preparing = tuple(names), dodging, preparing
         self.show_quiet = False
         self.rewind()
 
@@ -168,6 +229,8 @@ class EventLog:
         self.landed = dict.fromkeys(self.names, 0)
         self.avoided = dict.fromkeys(self.names, 0)
         self.struck = dict.fromkeys(self.names, 0)
+        self.done = dict.fromkeys(self.names, 0)
+        self.touched = dict.fromkeys(self.names, 0)
 
     def update(self, events: Sequence[Event], frame: int) -> list[Event]:
         """Take in what is new, and return it; nothing is returned after a jump backwards."""
@@ -193,6 +256,9 @@ class EventLog:
             elif event.kind in ("avoided", "struck"):
                 counts = self.avoided if event.kind == "avoided" else self.struck
                 counts[event.character] += 1
+            elif event.kind in ("done", "touched"):
+                counts = self.done if event.kind == "done" else self.touched
+                counts[event.character] += 1
 
     @property
     def lines(self) -> list[Event]:
@@ -213,6 +279,8 @@ def score_html(log: EventLog, most: int = 8) -> str:
     columns = {"strikes": log.thrown, "hits": log.landed}
     if log.dodging:
         columns = {"thrown": log.thrown, "avoided": log.avoided, "struck": log.struck}
+    if log.preparing:
+        columns = {"done": log.done, "hits": log.landed, "touched": log.touched}
     key = log.thrown if log.dodging else log.landed
     order = sorted(log.names, key=lambda n: -key[n]) if len(log.names) > most else log.names
     rows = "".join(
@@ -240,7 +308,7 @@ def _score_row(name: str, colour: str, counts: Sequence[int]) -> str:
 
 def _line_html(event: Event, fps: float, names: Sequence[str], faded: float) -> str:
     said = describe(event)
-    if event.kind not in ("strike", "hit", *DODGING):
+    if event.kind not in ("strike", "hit", *TOLD):
         said = f"{_words(event.kind)}: {said}" if said else _words(event.kind)
     weight = 600 if event.kind in LANDED and not event.data.get("blocked") else 400
     cell = "white-space:nowrap;vertical-align:top;padding-right:.5em"
