@@ -35,6 +35,8 @@ STRUCK_AROUND = 0.12  # s around its contact in which a blow may land
 RECOIL = 0.02  # m that a struck segment gives way per m/s of the blow
 NOTICED = 4.0  # m within which a thing ahead is prepared for by who is led by hand …
 AHEAD = np.radians(75)  # … so far to either side
+MARGIN = 0.5  # m: what is nearer than that is as likely as what is there
+CONVINCED, FORGETS = 12.0, 0.5  # 1/s, how fast a heading convinces, and how fast that is forgotten
 BEHIND = 1.5  # m that an opponent behind counts as farther away than one ahead
 WATCHED = 0.15  # s over which it is seen how opponents move
 PATIENCE = 5.0  # s without getting nearer to where the hand sent it, then it goes its own way
@@ -143,6 +145,8 @@ class PrepareScene:
         self.told = np.full((count, 2), np.nan)  # m: or where, by hand
         self._nearest = np.full(count, np.inf)  # m that it has come to there …
         self._nearer_at = np.zeros(count, dtype=np.int64)  # … in this frame
+        # How likely each thing is what somebody who is led by hand makes for.
+        self.belief = np.zeros((count, len(self.things)))
         self.turn = np.zeros(count, dtype=np.int64)  # how far each is in its course
         self.flees = np.zeros(count, dtype=np.int64)  # frame until which an opponent keeps away
         self.to_do = np.full(count, NOTHING)  # the motion to be done at a foe
@@ -299,6 +303,7 @@ class PrepareScene:
     def _aim(self) -> None:
         """Goals, sources of influence and what is prepared for, of all."""
         w = self.walkers
+        w.mix[:] = 0.0
         place, normal = self._objects_of(np.arange(len(self.names)))
         has = np.isfinite(place[:, 0])
         wants = np.full(len(has), NOTHING)
@@ -330,8 +335,12 @@ class PrepareScene:
         w.decide_anew(changed)
 
     def _notice(self, k: int) -> int:
-        """The motion for the nearest thing ahead of who is led by hand, which is its source of
-        influence; or for nothing."""
+        """The motion for what walker k, led by hand, seems to make for; or for nothing.
+
+        What that is nobody says: it is a belief over all things ahead, told by distance at first
+        and by where k heads then. The likeliest is the source of influence, and k prepares for all,
+        as far as each is likely (what section 8 of the paper asks for).
+        """
         w, things = self.walkers, self.things
         if self.foe[k] != NOBODY:
             w.source[k] = w.facing[self.foe[k], :2]
@@ -340,10 +349,20 @@ class PrepareScene:
             return NOTHING
         here = np.tile(w.facing[k], (len(things), 1))
         away, aside = seen(here, things.position[:, [0, 2]])
-        away[(np.abs(aside) > AHEAD) | (away > NOTICED)] = np.inf
-        n = int(np.argmin(away))
-        if not np.isfinite(away[n]):
+        near = (np.abs(aside) < AHEAD) & (away < NOTICED)
+        if not np.any(near):
+            self.belief[k] = 0.0
             return NOTHING
+        prior = np.where(near, 1.0 / (MARGIN + away), 0.0)
+        prior /= prior.sum()
+        # Nobody heads far aside of where he goes: a step of Bayes' rule, and a little forgetting.
+        likely = np.exp((np.cos(aside) - 1.0) * CONVINCED / self.fps)
+        known = np.where(self.belief[k] > 0.0, self.belief[k], prior)  # of what comes into view
+        now = np.where(near, known, 0.0) * likely
+        now /= now.sum()
+        self.belief[k] = now + (prior - now) * FORGETS / self.fps
+        n = int(np.argmax(self.belief[k]))
+        np.add.at(w.mix[k], things.motion, self.belief[k])
         w.source[k] = things.position[n, [0, 2]]
         return int(things.motion[n])
 

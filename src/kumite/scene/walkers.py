@@ -24,6 +24,7 @@ from kumite.rotation import (
     wrap_angle,
 )
 from kumite.synthesis import Cast, LevelFilter, Moment, Preparation, References, references
+from kumite.synthesis.preparation import blended
 
 PREPARATIONS = ("ours", "linear", "none")
 ON_THE_WAY = -1  # what somebody does who does no target motion
@@ -84,6 +85,7 @@ class Walkers:
         self.goal = np.array(homes)  # [K, 3] where to be, with what heading (NaN: any)
         self.source = np.zeros((count, 2))  # of influence
         self.wants = np.full(count, NOTHING)  # the target motion prepared for
+        self.mix = np.zeros((count, len(self.like)))  # how sure that is; all 0: it is certain
         self.doing = np.full(count, ON_THE_WAY)  # the target motion done
         self.level = np.zeros(count)  # chosen
         self.alpha = np.zeros(count)  # shown
@@ -269,8 +271,10 @@ class Walkers:
         headed = ~np.isnan(self.goal[:, 2])
         square = np.where(headed, np.clip((NEAR - off) / (NEAR - CLOSE), 0.0, 1.0), 0.0)
         by = (1.0 - square) * bearing + square * askew
-        there = np.where(self.heeds, square * np.minimum(np.abs(askew) / AWRY, 1.0), 0.0)
-        shift = self._steer(by, off < NEAR, there, ~busy & ~self.stands, came_from)
+        turns = square * np.minimum(np.abs(askew) / AWRY, 1.0)
+        there = np.where(self.heeds, turns, np.clip(1.0 - off / ARRIVED, 0.0, 1.0))
+        there = np.where(self.stands, 1.0, there)
+        shift = self._steer(by, off < NEAR, there, came_from)
         self._meet(np.flatnonzero(busy & np.isfinite(self._object[:, 0])), shift)
         self._lead()
         self.shown.show_cast(cast, self.alpha, np.arange(cast.count), shift)
@@ -280,25 +284,24 @@ class Walkers:
         by: np.ndarray,
         near: np.ndarray,
         there: np.ndarray,
-        goes: np.ndarray,
         came_from: np.ndarray,
     ) -> np.ndarray:
         """What all go and turn [K, 3] in this frame besides their locomotion.
 
         They turn towards what is seen at angles ``by`` [rad], and in sharp turns they go less far:
-        up to nearly on the spot, as where ``there`` (0 to 1) only the heading is missing. came_from
-        [K, 3]: where the locomotion was a frame ago.
+        up to nearly on the spot, as where they are ``there`` (0 to 1), but for the heading or the
+        end of a step. came_from [K, 3]: where the locomotion was a frame ago.
         """
         alpha, shift = self.alpha, np.zeros((len(by), 3))
+        goes = self.doing == ON_THE_WAY
         turn = self.guide.turn(self.row, by, near, alpha)
-        shift[:, 2] = np.where(goes, turn / self.fps, 0.0)
+        shift[:, 2] = np.where(goes & ~self.stands, turn / self.fps, 0.0)
         sharp = np.clip((np.abs(by) - SHARP[0]) / (SHARP[1] - SHARP[0]), 0.0, 1.0)
         wanted = np.where(goes, ON_THE_SPOT * np.maximum(sharp, there), 0.0)
         most = SLOWS / self.fps
         self._slow += np.clip(wanted - self._slow, -most, most)
         step = planar_compose(planar_inverse(came_from), self.cast.facing)[:, :2]
-        moves = self.doing == ON_THE_WAY
-        shift[:, :2] -= np.where(moves, self._slow * (1.0 - alpha), 0.0)[:, None] * step
+        shift[:, :2] -= np.where(goes, self._slow * (1.0 - alpha), 0.0)[:, None] * step
         pushed = np.flatnonzero(np.any(self.push != 0.0, axis=1))
         shift[pushed, :2] += turned_by(-self.facing[pushed, 2], self.push[pushed])
         return shift
@@ -318,7 +321,8 @@ class Walkers:
         plays, core = plays[who], self._core(who)
         frames = (table.last - table.first + 1)[self._stretch[who]]
         self._since[who] += np.where(plays == core, frames, 0)
-        due = self._heed_now[who] | (self._since[who] >= WHOLE * self._cycle[core])
+        stops = ~self.heeds & ~self.stands & (self.off()[0] < ARRIVED)
+        due = self._heed_now[who] | stops[who] | (self._since[who] >= WHOLE * self._cycle[core])
         if np.any(due):
             self._decide(who[due])
         core = self._core(who)
@@ -435,7 +439,8 @@ class Walkers:
     def _lead(self, at_once: np.ndarray | None = None) -> None:
         """Let reference postures become those of what is prepared for now."""
         wants = np.where(self.wants == NOTHING, self._posture_of, self.wants)
-        self._settled &= wants == self._posture_of
+        mixed = self.mix.sum(axis=1) > 0.0
+        self._settled &= (wants == self._posture_of) & ~mixed
         self._posture_of = wants
         who = np.flatnonzero(~self._settled) if at_once is None else at_once
         if len(who) == 0:
@@ -444,8 +449,13 @@ class Walkers:
         share = np.where(self.alpha[who] < UNSEEN, 1.0, share)
         if at_once is not None:
             share = np.ones(len(who))
-        left = self.shown.lead(who, self.like, wants[who], share)
-        self._settled[who] = left < ALIKE
+        like, which = self.like, wants[who]
+        if np.any(mixed[who]):
+            sure = np.eye(len(like))[which]
+            like = blended(like, np.where(mixed[who, None], self.mix[who], sure))
+            which = np.arange(len(who))
+        left = self.shown.lead(who, like, which, share)
+        self._settled[who] = (left < ALIKE) & ~mixed[who]
 
     def _moment(self, k: int) -> Moment:
         """What character k shows, and how it moves."""

@@ -72,6 +72,26 @@ def references(clips: ClipSet, frames: Sequence[int] | np.ndarray) -> References
     return References(wxyz, root[:, [0, 2]], clips.world[0][f][:, feet, 1])
 
 
+def blended(postures: References, weights: np.ndarray) -> References:
+    """Postures [N] in between: each the mean of all R, weighted by its row of weights [N, R].
+
+    Rotations are added as quaternions, all turned to the side of the heaviest. Errors: weights that
+    are not above 0 in all.
+    """
+    w = np.asarray(weights, dtype=np.float64)
+    if w.ndim != 2 or w.shape[1] != len(postures) or not np.all(w >= 0) or not np.all(w.sum(1) > 0):
+        raise KumiteError(
+            f"references: weights {list(w.shape)}; expected {len(postures)} in each row, "
+            "none below 0, not all 0"
+        )
+    w = w / w.sum(axis=1, keepdims=True)
+    main = postures.wxyz[np.argmax(w, axis=1)]  # [N, J, 4]
+    side = np.where(np.einsum("njc,rjc->nrj", main, postures.wxyz) < 0, -1.0, 1.0)
+    wxyz = np.einsum("nr,nrj,rjc->njc", w, side, postures.wxyz)
+    wxyz /= np.linalg.norm(wxyz, axis=-1, keepdims=True)
+    return References(wxyz, w @ postures.root, w @ postures.ankle)
+
+
 def curves(skeleton: Skeleton, given: Mapping[str, float] | None = None) -> np.ndarray:
     """The constant C [J] of each joint: 1 for the root, the pelvis and the legs, 0.5 for others.
 
