@@ -30,6 +30,7 @@ if TYPE_CHECKING:
         DodgeScene,
         LiveScene,
         Playback,
+        PrepareScene,
         Recording,
         builtin_scenes,
         load_recording,
@@ -59,6 +60,7 @@ _WHERE = {
     "scene": (
         "BoutScene",
         "DodgeScene",
+        "PrepareScene",
         "LiveScene",
         "Playback",
         "Recording",
@@ -95,6 +97,7 @@ __all__ = [
     "Library",
     "LiveScene",
     "Playback",
+    "PrepareScene",
     "Recording",
     "Skeleton",
     "approach",

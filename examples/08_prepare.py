@@ -1,0 +1,20 @@
+"""Somebody who prepares for a kick on the way to the ball, and who does not: what differs."""
+
+from kumite import PrepareScene, builtin_library, load_scene
+from kumite.scene.errands import PrepareSettings
+
+library = builtin_library(None, style="targets", level="preparation")
+for preparation in ("none", "ours"):
+    settings = load_scene("ball-kick").model_copy(
+        update={"prepare": PrepareSettings(preparation=preparation)}
+    )
+    scene = PrepareScene(settings, library, seed=1)
+    while scene.frame < 30 * scene.fps and not any(e.kind == "hit" for e in scene.events):
+        scene.step()
+    launch = next(e.data for e in scene.events if e.kind == "launch")
+    hit = next(e for e in scene.events if e.kind == "hit")
+    print(
+        f"{preparation:5}: prepared to {launch['level']:.2f}, {launch['apart_deg']:.1f} degrees "
+        f"from the motion's pose, foot on the ball {launch['to_contact']:.2f} s later "
+        f"at {hit.data['speed']:.1f} m/s"
+    )
