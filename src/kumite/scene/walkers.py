@@ -35,6 +35,8 @@ PATIENCE = 0.4  # s without getting nearer to its place, then it must do
 NEAR = 0.6  # m within which it may turn freely
 AWRY = np.radians(75)  # so far off its heading near its place, it has missed it …
 FAR_ENOUGH = 1.3  # m … and first goes so far away
+ASIDE, WIDE = np.radians(45), 2.5  # who is sent to a place so far aside, and nearer than so many m
+SHARPLY = 2.0  # turns so many times as fast: it would go round and round the place
 ARRIVED = 0.8  # m from a place where nothing is to be done: there a walk is ended
 KEEP = 2.5  # m to the next place: nearer, and the style is kept up until then
 POSTURE_HALF_LIFE = 0.12  # s in which one reference posture becomes another
@@ -268,6 +270,8 @@ class Walkers:
         turn = guide.turn(
             self.row, (1.0 - square) * bearing + square * askew, off < NEAR, self.alpha
         )
+        sharply = ~self.heeds & (off < WIDE) & (np.abs(bearing) > ASIDE)
+        turn = np.where(sharply, SHARPLY * turn, turn)
         shift = np.zeros((cast.count, 3))
         goes = ~busy & ~self.stands
         shift[:, 2] = np.where(goes, turn / self.fps, 0.0)
