@@ -271,7 +271,7 @@ class PrepareScene:
         away = np.hypot(*(self.told[led] - w.facing[led, :2]).T)
         nearer = (away < self._nearest[led] - 0.05) | (w.doing[led] != ON_THE_WAY)
         self._nearer_at[led[nearer]] = self.frame
-        self._nearest[led] = np.minimum(self._nearest[led], away)
+        self._nearest[led[nearer]] = away[nearer]
         stuck = self.frame - self._nearer_at[led] > PATIENCE * self.fps
         for k in led[(away < ARRIVED) | stuck].tolist():
             self.let_go(k)
@@ -475,6 +475,8 @@ class PrepareScene:
             self._event(
                 "passed", k, thing=self.things.names[n], clearance=-float(round(self._depth[k], 4))
             )
+        if n != NO_THING and self.thing[k] == n:  # some motions end as soon as they are past it
+            self._next(k)
         self._at[k], self._whom[k] = NO_THING, NOBODY
 
     def _pass(self, k: int, n: int) -> None:

@@ -31,7 +31,12 @@ class Targets:
         server: viser.ViserServer,
         objects: Sequence[SceneObject],
         moved: Callable[[str, np.ndarray], None],
+        dragged: Callable[[str, np.ndarray, np.ndarray], None] | None = None,
     ) -> None:
+        """dragged: told of objects that are dragged themselves, with the ray [3], [3] in the page's
+        world that points to their new place. A gizmo, which they have otherwise, takes all clicks
+        on them and round about.
+        """
         self._objects = tuple(o.name for o in objects)
         self._shown = [
             _add_parts(server, f"{STAGE}/object/{i}", o, parts)
@@ -44,8 +49,20 @@ class Targets:
         self._held: set[int] = set()
         self._flash = np.zeros(len(objects))  # s left
         for i, o in enumerate(objects):
-            if o.draggable:
+            if o.draggable and dragged is None:
                 self._gizmos[i] = self._add_gizmo(server, i, o, moved)
+            elif o.draggable and dragged is not None:
+                self._let_drag(i, o.name, dragged)
+
+    def _let_drag(
+        self, index: int, name: str, dragged: Callable[[str, np.ndarray, np.ndarray], None]
+    ) -> None:
+        def drag(event: viser.SceneNodeDragEvent) -> None:
+            (self._held.discard if event.phase == "end" else self._held.add)(index)
+            eye = np.asarray(event.client.camera.position, dtype=np.float64)
+            dragged(name, eye, np.asarray(event.end_position) - eye)
+
+        self._shown[index].on_drag(drag)
 
     def _add_gizmo(
         self,

@@ -161,12 +161,13 @@ class Prepared:
         """Under the lock: what is asked for, as it is now."""
         w, asked = self.scene.walkers, self.asked
         k = asked.who
-        goal = w.goal[k].copy()
+        goal, told = w.goal[k].copy(), self.scene.told[k].copy()
         # At a goal without a heading nothing is begun; who does a motion has begun it.
         begins = np.isfinite(goal[2]) and w.doing[k] == ON_THE_WAY
         shows = begins and (asked.posture or asked.support)
         return PreparedPicture(
-            goal[:2] if asked.goal and self._goes() else None,
+            # Where the hand has just sent it, it goes from the next frame on.
+            (told if np.isfinite(told[0]) else goal[:2]) if asked.goal and self._goes() else None,
             int(w.wants[k]) if shows else NOTHING,
             goal,
             Asked(**vars(asked)),

@@ -99,14 +99,15 @@ class Studio:
         self._follow = ring.Follow(ring.build(server))
         unarmed = getattr(stage, "unarmed", ())
         self._bodies = bodies.show_bodies(server, stage.skeleton, mesh, stage.names, unarmed)
-        self._targets = props.Targets(server, stage.objects, self.move_object)
+        self._walk = stage if isinstance(stage, PrepareScene) else None
+        dragged = None if self._walk is None else self._drag_object
+        self._targets = props.Targets(server, stage.objects, self.move_object, dragged)
         self._bursts = props.Bursts(server)
         self._fight = stage if isinstance(stage, BoutScene) else None
         self._targeted = np.array([not o.thrown for o in stage.objects], dtype=bool)
         dodge = stage if isinstance(stage, DodgeScene) else None
         self._throws = None if dodge is None else Throws(dodge)
         self._volumes = None if dodge is None else Volumes(server, dodge)
-        self._walk = stage if isinstance(stage, PrepareScene) else None
         self._prepared = None if self._walk is None else Prepared(server, self._walk, mesh)
         self._sketch = Sketch()
         self._paths = Paths(server, self._move_check_point)
@@ -239,6 +240,14 @@ class Studio:
         if place is not None and fight is not None and self._sketch.who != who:
             with contextlib.suppress(KumiteError):  # its path may have been cleared meanwhile
                 self.direct(lambda: fight.move_check_point(fight.names[who], index, place))
+
+    def _drag_object(self, name: str, eye: np.ndarray, way: np.ndarray) -> None:
+        """Put an object where a ray of the page meets the level that it is at."""
+        eye = self.from_page(eye)
+        level = next(o.position[1] for o in self.stage.objects if o.name == name)
+        place = on_floor(eye - [0.0, level, 0.0], way)
+        if place is not None:
+            self.move_object(name, np.array([place[0], level, place[1]]))
 
     def move_object(self, name: str, position: np.ndarray) -> None:
         """Put an object at ``position`` [3] m."""

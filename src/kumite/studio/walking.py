@@ -20,12 +20,15 @@ KEYS = {UP: ("arrowup", "I"), LEFT: ("arrowleft", "J"), DOWN: ("arrowdown", "K")
 }
 WORDS = {UP: "up", LEFT: "left", DOWN: "down", RIGHT: "right"}
 # The viewer turns its camera by the arrow keys as well, and cannot be told not to. It listens at
-# the document, hot keys one node below: there an event that has been heard is stopped.
-ARROWS_TURN_NO_CAMERA = (
+# the document, hot keys one node below: there an event that has been heard is stopped. And a box
+# that was ticked keeps all keys to itself until it is left.
+KEYS_ARE_OURS = (
     '<img src="data:," hidden onerror="'
-    "if(!window.kumiteArrows){window.kumiteArrows=true;"
-    "document.documentElement.addEventListener('keydown',function(e)"
-    "{if(e.code.indexOf('Arrow')===0)e.stopPropagation()})}"
+    "if(!window.kumiteKeys){window.kumiteKeys=true;var root=document.documentElement;"
+    "root.addEventListener('keydown',function(e)"
+    "{if(e.code.indexOf('Arrow')===0)e.stopPropagation()});"
+    "root.addEventListener('change',function(e)"
+    "{if(e.target.type==='checkbox')e.target.blur()})}"
     '">'
 )
 
@@ -46,7 +49,7 @@ class Walking:
         with gui.add_folder("Walk"):
             gui.add_html(
                 '<div style="padding:0 1em .5em;font-size:.85em;opacity:.75">click on the floor or '
-                f"on a thing; arrow keys or I J K L{ARROWS_TURN_NO_CAMERA}</div>"
+                f"on a thing; arrow keys or I J K L{KEYS_ARE_OURS}</div>"
             )
             if scene.users > 1:
                 names = scene.names[: scene.users]
