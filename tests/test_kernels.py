@@ -96,3 +96,55 @@ def test_plugged_kernels_are_kept_and_not_confused(tmp_path: Path):
     # kept code is the same.
     assert run(PLUGS.replace("x + 1.0", "x + 2.0")) == ["20.0", "0", "72.0", "0"]
     assert run(PLUGS.replace("1.0 * x", "2.0 * x")) == ["26.0", "0", "35.0", "0"]
+
+
+BOTH = """
+import numpy as np
+from numba import prange
+from kumite.kernels.jit import kernel, parallel_kernel
+
+def _double(x):
+    for n in prange(len(x)):
+        x[n] *= 2.0
+
+few, many = kernel(_double), parallel_kernel(_double)
+x = np.ones(4)
+few(x)
+many(x)
+print(x[0], sum(few.stats.cache_hits.values()), sum(many.stats.cache_hits.values()))
+"""
+
+
+@pytest.mark.slow
+def test_a_function_compiled_both_ways_is_kept_as_both(tmp_path: Path):
+    """Numba's key for kept code does not say whether loops run on all cores."""
+    (tmp_path / "both.py").write_text(BOTH, "utf-8")
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(Path(kumite.__file__).parent.parent),
+        "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+    }
+    for hits in ("0 0", "1 1"):
+        command = [sys.executable, str(tmp_path / "both.py")]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        assert done.stdout.split() == ["4.0", *hits.split()]
+
+
+@pytest.mark.slow
+def test_crowds_are_shown_by_what_is_compiled_first(tmp_path: Path):
+    """A crowd before anybody alone: loops on all cores are compiled from nothing."""
+    script = (
+        "from kumite.graph import builtin_library; from kumite.kernels import character\n"
+        "from kumite.synthesis import Cast\n"
+        "cast = Cast(builtin_library(None), character.MANY)\n"
+        "cast.show(0.0); print(character._show_many.signatures != [])"
+    )
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(Path(kumite.__file__).parent.parent),
+        "NUMBA_CACHE_DIR": str(tmp_path),
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["True"]

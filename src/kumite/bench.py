@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from kumite.bench_preparation import preparation_figures
 from kumite.errors import KumiteError
 
 REPEATS = 3
@@ -440,35 +441,7 @@ def _looked_at(folder: Path) -> float:
     return float(np.mean([d.nodes.sum() for d in found]))
 
 
-def _walker():
-    """Seven motions of a walker, at five levels of preparation: each may follow each."""
-    from kumite.control import Motions
-
-    quarter = np.pi / 4
-    whole = [[0, 0, 0], [0, 0.65, 0], [0.55, 0.1, 0], [-0.55, 0.1, 0], [0, -0.52, 0]]
-    whole += [[0, 0, quarter], [0, 0, -quarter]]
-    scale = 1 - 0.2 * np.arange(5)
-    names = ("stand", "forward", "left", "right", "back", "turn left", "turn right")
-    moves = np.array(whole)[:, None, :] * scale[None, :, None]
-    return Motions(names, moves, np.full(7, 0.6), np.ones((7, 7), bool))
-
-
-def _learning(gradually: bool) -> float:
-    from kumite.control import PreparationSettings, gradual
-    from kumite.control.preparation import train
-
-    settings, motions = gradual() if gradually else PreparationSettings(), _walker()
-    return _best(lambda: train(motions, settings))
-
-
-@_figure("preparation learned by SARSA to the paper's rule", "s", 10.0)
-def _preparation(folder: Path) -> float:
-    return _learning(False)
-
-
-@_figure("preparation learned by SARSA, levels that rise step by step", "s", 10.0)
-def _preparation_gradual(folder: Path) -> float:
-    return _learning(True)
+_FIGURES |= preparation_figures(_best)
 
 
 @cache

@@ -9,14 +9,14 @@ controller knows nothing more, how far to prepare so as to come to rest at the p
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from kumite.control.approaching import STEEREST, Approach, trained_approach
-from kumite.control.preparation import PreparationPolicy, gradual
+from kumite.control.preparation import PreparationPolicy, PreparationSettings, gradual
 from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.graph.hierarchy import ways_into_cores
@@ -98,15 +98,18 @@ def learned_guide(
     *,
     gaits: Sequence[str] | None = None,
     levels: bool = True,
+    settings: PreparationSettings | None = None,
     progress: Callable[[int, float], None] = lambda batch, changed: None,
 ) -> Guide:
     """A guide of this library: its policies are read from ``folder``, or learned and kept there.
 
     curve [T]: C of the root, of each target motion: targets that share it share a policy (section
-    6). levels: whether anybody prepares; else the policies know level 0 only. Errors: as
-    :func:`trained_approach`'s.
+    6). levels: whether anybody prepares; else the policies know level 0 only. settings: how it is
+    learned, :func:`gradual` by default. Errors: as :func:`trained_approach`'s.
     """
-    settings = gradual() if levels else gradual(levels=1)
+    settings = settings or gradual()
+    if not levels:
+        settings = replace(settings, levels=1)
     constants, policy_of = np.unique(curve, return_inverse=True)
     learned = [
         trained_approach(library, folder, settings, gaits=gaits, curve=c, progress=progress)

@@ -480,14 +480,83 @@ def show_one(k, dt, played):
         reach(thigh, shin, foot, build.below[s], goal, parents, bones, wxyz, position, world)
 
 
-def _show(dt, played):
+class Own(NamedTuple):
+    """What a :class:`Played` has besides its tuples."""
+
+    frame: np.ndarray
+    fraction: np.ndarray
+    rate: np.ndarray
+    pace: np.ndarray
+    stop: np.ndarray
+    anchor: np.ndarray
+    jump: np.ndarray
+    first: np.ndarray
+    last: np.ndarray
+    blow_of_frame: np.ndarray
+    held: np.ndarray
+
+
+@kernel
+def own_of(p):
+    return Own(
+        p.frame,
+        p.fraction,
+        p.rate,
+        p.pace,
+        p.stop,
+        p.anchor,
+        p.jump,
+        p.first,
+        p.last,
+        p.blow_of_frame,
+        p.held,
+    )
+
+
+@kernel
+def show_part(k, dt, own, springs, capture, build, offsets, poses):
+    """:func:`show_one` of what makes a :class:`Played`."""
+    whole = Played(
+        own.frame,
+        own.fraction,
+        own.rate,
+        own.pace,
+        own.stop,
+        own.anchor,
+        own.jump,
+        own.first,
+        own.last,
+        own.blow_of_frame,
+        own.held,
+        springs,
+        capture,
+        build,
+        offsets,
+        poses,
+    )
+    show_one(k, dt, whole)
+
+
+def _show(dt, own, springs, capture, build, offsets, poses):
+    for k in prange(own.frame.shape[0]):
+        show_part(k, dt, own, springs, capture, build, offsets, poses)
+
+
+_show_many = parallel_kernel(_show)
+
+
+@kernel
+def show(dt, played):
     """One frame of all characters: offsets move on by dt, poses are made, feet put down."""
-    for k in prange(played.frame.shape[0]):
+    for k in range(played.frame.shape[0]):
         show_one(k, dt, played)
 
 
-show = kernel(_show)
-show_many = parallel_kernel(_show)  # on all cores: worth its start-up from ``MANY`` characters on
+@kernel
+def show_many(dt, played):
+    """:func:`show` on all cores: worth its start-up from ``MANY`` characters on."""
+    p = played  # a loop on all cores is handed tuples of arrays, but none that hold others
+    _show_many(dt, own_of(p), p.springs, p.capture, p.build, p.offsets, p.poses)
 
 
 @kernel

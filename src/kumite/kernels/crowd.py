@@ -20,7 +20,7 @@ from kumite.kernels.blow import (
     squareness,
     swept_contact,
 )
-from kumite.kernels.character import begin, planar_point, show_one
+from kumite.kernels.character import begin, own_of, planar_point, show_part
 from kumite.kernels.jit import kernel, parallel_kernel, plugged
 from kumite.kernels.limb import turned
 from kumite.kernels.look_ahead import look_ahead, look_further
@@ -383,35 +383,76 @@ def start_blows(played, grid, shapes, blows):
         throw_one(k, played.blow_of_frame, played.frame[k], blows)
 
 
-def _advance(dt, played, grid, opponent, room, shapes, blows):
+def _advance(dt, own, springs, capture, build, offsets, poses, grid, opponent, room, shapes, blows):
+    frame, place = own.frame, poses.root_position
+    for k in prange(frame.shape[0]):
+        move_on(k, frame, own.fraction, own.rate, own.pace)
+        show_part(k, dt, own, springs, capture, build, offsets, poses)
+    fill_hash(place, grid)
+    for k in prange(frame.shape[0]):
+        push_one(k, place, room.closest, room.most, grid, room.push[k])
+    for k in prange(frame.shape[0]):
+        carry_away(k, room.push, own.anchor, offsets.foot)
+    count = 0
+    for k in prange(frame.shape[0]):
+        measure_one(k, poses.position, poses.world_wxyz, shapes, blows)
+        begun, blows.flying[k] = throw_one(k, own.blow_of_frame, frame[k], blows)
+        count += begun
+    for k in prange(frame.shape[0]):
+        if blows.flying[k]:
+            count += hit_one(k, opponent[k], shapes, blows)
+    return count
+
+
+_advance_few = kernel(_advance)
+_advance_many = parallel_kernel(_advance)
+
+
+@kernel
+def advance(dt, played, grid, opponent, room, shapes, blows):
     """One frame of all along the actions begun: all move on, bodies are kept apart, blows tested.
 
     Returns how many blows began or landed.
 
     grid holds where all stand afterwards.
     """
-    place = played.poses.root_position
-    for k in prange(played.frame.shape[0]):
-        move_on(k, played.frame, played.fraction, played.rate, played.pace)
-        show_one(k, dt, played)
-    fill_hash(place, grid)
-    for k in prange(played.frame.shape[0]):
-        push_one(k, place, room.closest, room.most, grid, room.push[k])
-    for k in prange(played.frame.shape[0]):
-        carry_away(k, room.push, played.anchor, played.offsets.foot)
-    count = 0
-    for k in prange(played.frame.shape[0]):
-        measure_one(k, played.poses.position, played.poses.world_wxyz, shapes, blows)
-        begun, blows.flying[k] = throw_one(k, played.blow_of_frame, played.frame[k], blows)
-        count += begun
-    for k in prange(played.frame.shape[0]):
-        if blows.flying[k]:
-            count += hit_one(k, opponent[k], shapes, blows)
-    return count
+    p = played
+    own, offsets = own_of(p), p.offsets
+    return _advance_few(
+        dt,
+        own,
+        p.springs,
+        p.capture,
+        p.build,
+        offsets,
+        p.poses,
+        grid,
+        opponent,
+        room,
+        shapes,
+        blows,
+    )
 
 
-advance = kernel(_advance)
-advance_many = parallel_kernel(_advance)  # on all cores
+@kernel
+def advance_many(dt, played, grid, opponent, room, shapes, blows):
+    """:func:`advance` on all cores."""
+    p = played  # a loop on all cores is handed tuples of arrays, but none that hold others
+    own, offsets = own_of(p), p.offsets
+    return _advance_many(
+        dt,
+        own,
+        p.springs,
+        p.capture,
+        p.build,
+        offsets,
+        p.poses,
+        grid,
+        opponent,
+        room,
+        shapes,
+        blows,
+    )
 
 
 def _step(

@@ -49,9 +49,22 @@ kernel = _kept_while_all_sources_are(
 lean_kernel = _kept_while_all_sources_are(
     njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, _nrt=False)  # type: ignore[call-overload]
 )
-parallel_kernel = _kept_while_all_sources_are(
-    njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, parallel=True)
-)
+
+
+def parallel_kernel(function: Callable[..., Any]) -> Any:
+    """A kernel whose ``prange`` loops run on all cores.
+
+    It is compiled under a name of its own: kept code is found by file, name, line and types, so a
+    function that is compiled both ways would otherwise be read in the way that came first.
+    """
+    copy = FunctionType(function.__code__, function.__globals__, function.__name__)
+    copy.__qualname__ = f"{function.__qualname__}_on_all_cores"
+    copy.__doc__ = function.__doc__
+    dispatcher = njit(
+        cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, parallel=True
+    )(copy)
+    _stamp(dispatcher)
+    return dispatcher
 
 
 def plugged(template: Callable[..., Any], parallel: bool = False, **plugs: Any) -> Any:

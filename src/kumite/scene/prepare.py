@@ -11,6 +11,7 @@ from scipy.spatial import KDTree
 from kumite.body import lay_body
 from kumite.clip import LIMBS
 from kumite.control.guide import learned_guide, seen
+from kumite.control.preparation import PreparationSettings
 from kumite.errors import KumiteError, unknown
 from kumite.graph import Library
 from kumite.kernels.blow import swept_contact
@@ -55,9 +56,12 @@ class PrepareScene:
         *,
         seed: int = 0,
         cache: Path | None = None,
+        learning: PreparationSettings | None = None,
         progress: Callable[[int, float], None] = lambda batch, changed: None,
     ) -> None:
-        """Errors: another kind of library; motions that it does not have; obstacles that these do
+        """learning: how the approach is learned, :func:`~kumite.control.gradual` by default.
+
+        Errors: another kind of library; motions that it does not have; obstacles that these do
         not clear; somebody who begins in an obstacle; too many characters."""
         if library.preparing is None:
             raise KumiteError(
@@ -104,6 +108,7 @@ class PrepareScene:
             self.curve[:, 0],
             gaits=self.prepare.gaits or None,
             levels=self.prepare.preparation != "none",
+            settings=learning,
             progress=progress,
         )
         self.automatic = self.prepare.automatic

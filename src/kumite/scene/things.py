@@ -124,22 +124,30 @@ class Things:
         """Balls roll and bounce; what hangs swings back to where it belongs."""
         moving = np.linalg.norm(self.velocity, axis=1) > 0.0
         moving |= np.any(self.position != self.home, axis=1) & ~self.lies
-        for n in np.flatnonzero(moving & (self.kind == STRIKE)).tolist():
-            p, v, r = self.position[n], self.velocity[n], self.radius[n]
-            if not self.lies[n]:
-                v += dt * (49.0 * (self.home[n] - p) - 3.5 * v)
-                p += dt * v
-            else:
-                v[1] -= GRAVITY * dt
-                p += dt * v
-                if p[1] < r:
-                    p[1] = r
-                    v *= [0.8, -BOUNCE, 0.8] if v[1] < -REST else [1.0, 0.0, 1.0]
-                if p[1] <= r + 1e-3:
-                    v *= np.exp(-(ROLLING + FRICTION) * dt)
-                if p[1] <= r + 1e-3 and np.linalg.norm(v) < AT_REST:
-                    v[:] = 0.0
-            self.objects[self._object_of[n]].position = p.copy()
+        moving &= self.kind == STRIKE
+        self._swing(np.flatnonzero(moving & ~self.lies), dt)
+        self._roll(np.flatnonzero(moving & self.lies), dt)
+        for n in np.flatnonzero(moving).tolist():
+            self.objects[self._object_of[n]].position = self.position[n].copy()
+
+    def _swing(self, which: np.ndarray, dt: float) -> None:
+        p, v = self.position[which], self.velocity[which]
+        v += dt * (49.0 * (self.home[which] - p) - 3.5 * v)
+        self.position[which], self.velocity[which] = p + dt * v, v
+
+    def _roll(self, which: np.ndarray, dt: float) -> None:
+        p, v, r = self.position[which], self.velocity[which], self.radius[which]
+        v[:, 1] -= GRAVITY * dt
+        p += dt * v
+        below = p[:, 1] < r
+        bounces = below & (v[:, 1] < -REST)
+        p[below, 1] = r[below]
+        v[bounces] *= [0.8, -BOUNCE, 0.8]
+        v[below & ~bounces, 1] = 0.0
+        rolls = p[:, 1] <= r + 1e-3
+        v[rolls] *= np.exp(-(ROLLING + FRICTION) * dt)
+        v[rolls & (np.linalg.norm(v, axis=1) < AT_REST)] = 0.0
+        self.position[which], self.velocity[which] = p, v
 
     def move(self, name: str, position: np.ndarray) -> None:
         """Put a ball somewhere."""

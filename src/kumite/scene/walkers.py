@@ -373,10 +373,10 @@ class Walkers:
         if not self.prepares:
             return
         soon = (self.doing != ON_THE_WAY) & (self.wants != NOTHING)
-        for k in np.flatnonzero(soon).tolist():
+        if not np.any(soon):
+            return
+        for k in np.flatnonzero(soon & (self.off()[0] <= KEEP)).tolist():
             t, then = int(self.doing[k]), int(self.wants[k])
-            if self.off()[0][k] > KEEP:
-                continue
             frame, land, stop = self._early(t, then)
             if self.cast.frame[k] < frame:
                 continue
