@@ -248,6 +248,7 @@ def test_motions_are_begun_where_and_as_the_posture_is_shown(make: Make, name: s
         prepared = studio._prepared
         assert prepared is not None
         prepared.asked.posture = prepared.asked.support = True
+        shown, there, mine = prepared.look(), np.zeros(3), np.zeros(3)
         while not any(e.kind == "launch" for e in stage.events):
             shown = prepared.look()
             ghost = prepared.posture(shown.target)
