@@ -248,6 +248,7 @@ def test_motions_are_begun_where_and_as_the_posture_is_shown(make: Make, name: s
         prepared = studio._prepared
         assert prepared is not None
         prepared.asked.posture = prepared.asked.support = True
+        shown, there, mine = prepared.look(), np.zeros(3), np.zeros(3)
         while not any(e.kind == "launch" for e in stage.events):
             shown = prepared.look()
             ghost = prepared.posture(shown.target)
@@ -440,9 +441,13 @@ def test_clicks_and_keys_lead_a_walker(make: Make):
 
         page.keyboard.press("6")
         assert wait(lambda: any(e.data.get("motion") == "punch" for e in stage.events))
+        studio.step_once()  # it waits in its punch, however slow the page is
         browser.wait_until(page, lambda: "punch, prepared to" in page.inner_text("body"), "a line")
         page.get_by_role("button", name="5 front kick").click()
-        browser.wait_until(page, lambda: "anna does punch" in page.inner_text("body"), "busy")
+        browser.wait_until(page, lambda: "Busy" in page.inner_text("body"), "busy")
+        assert "anna does punch" in page.inner_text("body")
+        assert sum(e.kind == "launch" for e in stage.events) == 1
+        studio.toggle()
         browser.wait_until(page, lambda: "is done" in page.inner_text("body"), "the end of it")
         page.get_by_label("By itself", exact=True).click()
         assert wait(lambda: stage.automatic)

@@ -179,7 +179,7 @@ class Prepared:
             if self._of != picture.asked.who:
                 self._of = picture.asked.who
                 self._ring.color = mix(corner(self._of), (255, 255, 255), 0.3)
-            self._ring.position = (*picture.goal[:1], 0.0, *picture.goal[1:])
+            self._ring.position = np.insert(picture.goal, 1, 0.0)
         self._switch(self._ring, picture.goal is not None)
         t = picture.target
         if t != NOTHING:
