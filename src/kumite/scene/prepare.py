@@ -14,6 +14,7 @@ from kumite.control.guide import learned_guide, seen
 from kumite.control.preparation import PreparationSettings
 from kumite.errors import KumiteError, unknown
 from kumite.graph import Library
+from kumite.graph.preparing import Preparing
 from kumite.kernels.blow import swept_contact
 from kumite.rotation import from_yaw, planar_apply, planar_inverse, rotate
 from kumite.scene.balls import capsules_of
@@ -69,6 +70,7 @@ class PrepareScene:
                 "'kumite build --level preparation'"
             )
         self.settings, self.library, self.title = settings, library, settings.title
+        self.preparing: Preparing = library.preparing
         self.fps, self.skeleton = library.clips.fps, library.clips.skeleton
         self.prepare = settings.prepare or PrepareSettings()
         self.names = settings.names
@@ -317,7 +319,7 @@ class PrepareScene:
         w.heeds[:] = has & np.isnan(self.told[:, 0])
         busy = np.flatnonzero((w.doing != ON_THE_WAY) & (self._whom != NOBODY))
         for k in busy.tolist():
-            left = (self.library.preparing.contact[w.doing[k]] - w.cast.frame[k]) / self.fps
+            left = (self.preparing.contact[w.doing[k]] - w.cast.frame[k]) / self.fps
             if left > 0:
                 w.aim(k, self._foe_place(k, int(self._whom[k]), int(w.doing[k]), left))
         who = np.flatnonzero(has)
@@ -393,7 +395,7 @@ class PrepareScene:
         at = w.shown.root_position[foe, [0, 2]] + seconds * moves
         way = w.facing[k, :2] - at
         at = at + SKIN * way / max(float(np.hypot(*way)), 1e-9)
-        return np.array([at[0], self.library.preparing.place[t, 1], at[1]])
+        return np.array([at[0], self.preparing.place[t, 1], at[1]])
 
     def _closing_in(self, k: int) -> np.ndarray:
         """Where [3] an opponent goes: up to the nearest walker, or away from it for a while."""
@@ -417,7 +419,7 @@ class PrepareScene:
         self._landed[k], self._depth[k] = False, -np.inf
         self._at[k] = self.thing[k] if meets else self._nearest_thing(k, t)
         self._whom[k] = self.foe[k]
-        limb = int(self.library.preparing.limb[t])
+        limb = int(self.preparing.limb[t])
         if limb >= 0:
             self._event("strike", k, limb=LIMBS[limb], blow=t)
 
@@ -448,7 +450,7 @@ class PrepareScene:
 
     def _contacts(self) -> None:
         """What target motions meet in this frame."""
-        w, p = self.walkers, self.library.preparing
+        w, p = self.walkers, self.preparing
         busy = w.doing != ON_THE_WAY
         over = np.flatnonzero(self._busy & ~busy)
         self._busy = busy
@@ -505,7 +507,7 @@ class PrepareScene:
 
     def _strike(self, k: int, t: int) -> None:
         """Does the blow of target t land in this frame?"""
-        w, limb = self.walkers, int(self.library.preparing.limb[t])
+        w, limb = self.walkers, int(self.preparing.limb[t])
         before, now = w.shown_before, (w.shown.position, w.shown.world_wxyz)
         p0, p1 = (self._tip_now(k, limb, pose) for pose in (before, now))
         velocity = (p1 - p0) * self.fps

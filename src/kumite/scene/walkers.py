@@ -352,6 +352,14 @@ class Walkers:
             (far, np.where(nothing, np.pi, aside)),
             self.wants[who],
         )
+        # Who is led elsewhere prepares as if it went to its source: nobody knows what for it goes.
+        led = np.flatnonzero(~self.heeds[who] & ~nothing)
+        if len(led):
+            source = (far[led], aside[led])
+            of = who[led]
+            level[led] = guide.choose(self.row[of], self.level[of], source, source, self.wants[of])[
+                1
+            ]
         self.stands[who] = ~self.heeds[who] & (away < ARRIVED)
         unprepared = nothing | (not self.prepares)
         self.level[who] = np.where(unprepared, 0.0, level)
