@@ -40,6 +40,7 @@ KEEP = 2.5  # m to the next place: nearer, and the style is kept up until then
 POSTURE_HALF_LIFE = 0.12  # s in which one reference posture becomes another
 READY = 0.5  # level from which on a target motion is begun at its reference posture
 WHOLE = 0.8  # of a cycle after which it counts as done: it is entered anywhere
+STEEPEST = 3.0  # 1/s, of the level shown: the filter's own
 UNSEEN = 0.01  # level below which nobody sees what posture is prepared for
 ALIKE = 1e-3  # of a quaternion, or m: postures nearer to each other are the same
 
@@ -254,7 +255,7 @@ class Walkers:
         smooth = self.filter.push(np.where(busy, 0.0, self.level))
         off, _ = self.off()
         bearing = seen(self.facing, steered_for(self.facing, self.goal))[1]
-        self.alpha = np.where(busy, 0.0, smooth)
+        was, self.alpha = self.alpha, np.where(busy, 0.0, smooth)
         askew = np.nan_to_num(wrap_angle(self.goal[:, 2] - self.facing[:, 2]))
         turned = (np.abs(askew) > AWRY) & (self.wants != NOTHING) & self.heeds
         self._passed = ~busy & (off < FAR_ENOUGH) & (self._passed | ((off < NEAR) & turned))
@@ -263,6 +264,9 @@ class Walkers:
             before = (np.abs(bearing) < 0.5 * np.pi) | (off < OFF)  # its place, or at it
             rests = before & ~self._passed & self.heeds & (self.wants != NOTHING) & ~busy
             self.alpha = np.where(rests, np.maximum(smooth, guide.settle(off)), self.alpha)
+            # Who comes to rest, or misses its place after all, does not jump into it or out of it.
+            step = STEEPEST / self.fps
+            self.alpha = np.where(busy, 0.0, np.clip(self.alpha, was - step, was + step))
         headed = ~np.isnan(self.goal[:, 2])
         square = np.where(headed & ~self._passed, np.clip(1.0 - off / NEAR, 0.0, 1.0), 0.0)
         turn = guide.turn(
