@@ -5,8 +5,8 @@
     python benchmarks/preparation_compared.py -o docs/preparation.md  # between its marks
 
 Approaches begin anywhere 3 to 7 m from what there is to do, facing anywhere: the same ones for
-every way of preparing. All of a seed and a way go in one scene, each in a field of its own. Shum et al.
-(2013, section 8) show pictures of theirs and name no figures.
+every way of preparing. All of a seed and a way go in one scene, each in a field of its own. Shum
+et al. (2013) show pictures of theirs and name no figures.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def fields(library: Library, preparation: str, runs: int, seed: int) -> SceneSet
         about="approaches side by side",
         walker=tuple(walkers),
         target=tuple(things),
-        prepare=PrepareSettings(preparation=preparation),
+        prepare=PrepareSettings.model_validate({"preparation": preparation}),
     )
 
 
