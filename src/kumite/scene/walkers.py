@@ -43,6 +43,7 @@ KEEP = 2.5  # m to the next place: nearer, and the style is kept up until then
 POSTURE_HALF_LIFE = 0.12  # s in which one reference posture becomes another
 READY = 0.5  # level from which on a target motion is begun at its reference posture
 WHOLE = 0.8  # of a cycle after which it counts as done: it is entered anywhere
+STEEPEST = 3.0  # 1/s, of the level shown: the filter's own
 UNSEEN = 0.01  # level below which nobody sees what posture is prepared for
 ALIKE = 1e-3  # of a quaternion, or m: postures nearer to each other are the same
 
@@ -202,8 +203,8 @@ class Walkers:
     ) -> None:
         """Let character k begin target t now, from the pose it shows.
 
-        place [3] m: of the object: the motion is bent to meet it; None: as captured. normal: the
-        way through it. Begun at the reference posture by who is prepared, else where, up to the
+        place [3] m: of the object: the motion is bent to meet it, if that takes no more than ``OFF``
+        and ``ASKEW``; None: as captured. normal: the way through it. Begun at the reference posture by who is prepared, else where, up to the
         mark, the motion is most like what is shown.
         """
         p, clips, cast = self.preparing, self.library.clips, self.cast
@@ -215,11 +216,15 @@ class Walkers:
         self.doing[k], self._heed_now[k], self._stretch[k] = t, False, NOTHING
         self.filter.restart(k, 0.0)
         self._span[k] = first, p.contact[t]
-        start = clips.facing[h.targets.start[t]]
-        there = planar_apply(planar_compose(cast.anchor[k], start), p.place[t])
-        bent = place is not None and np.hypot(*(place - there)[[0, 2]]) <= OFF
-        self._object[k] = place if bent else np.nan
-        self._way[k] = normal - p.way[t] - start[2] if bent else np.nan
+        self._object[k], self._way[k], off = np.nan, np.nan, None
+        if place is not None:
+            which, here = np.array([t]), self.facing[k]
+            goal = self.stance(which, place[None], here[None], np.array([normal]))[0]
+            off = round(float(np.hypot(*(goal[:2] - here[:2]))), 4)
+            if off <= OFF and np.abs(wrap_angle(goal[2] - here[2])) <= ASKEW:
+                self._object[k] = place
+                # The turn of the capture that makes it face as it should.
+                self._way[k] = goal[2] - clips.facing[self.begins_at(which)[0], 2]
         self.event(
             "launch",
             k,
@@ -227,7 +232,7 @@ class Walkers:
             level=round(float(self.alpha[k]), 4),
             apart_deg=round(float(np.degrees(apart)), 3),
             to_contact=round((int(p.contact[t]) - first) / self.fps, 4),
-            bent=None if place is None else round(float(np.hypot(*(place - there)[[0, 2]])), 4),
+            bent=off if np.isfinite(self._way[k]) else None,
         )
 
     def _best_beginning(self, k: int, t: int) -> tuple[int, float]:
@@ -260,7 +265,7 @@ class Walkers:
         smooth = self.filter.push(np.where(busy, 0.0, self.level))
         off, _ = self.off()
         bearing = seen(self.facing, steered_for(self.facing, self.goal))[1]
-        self.alpha = np.where(busy, 0.0, smooth)
+        was, self.alpha = self.alpha, np.where(busy, 0.0, smooth)
         askew = np.nan_to_num(wrap_angle(self.goal[:, 2] - self.facing[:, 2]))
         if self.prepares:
             # Who is askew has as far to go: prepared it could not turn.
@@ -268,6 +273,9 @@ class Walkers:
             before = (np.abs(bearing) < 0.5 * np.pi) | (off < OFF)  # its place, or at it
             rests = before & self.heeds & (self.wants != NOTHING) & ~busy
             self.alpha = np.where(rests, np.maximum(smooth, guide.settle(off + wrong)), self.alpha)
+            # Who comes to rest, or misses its place after all, does not jump into it or out of it.
+            step = STEEPEST / self.fps
+            self.alpha = np.where(busy, 0.0, np.clip(self.alpha, was - step, was + step))
         headed = ~np.isnan(self.goal[:, 2])
         square = np.where(headed, np.clip((NEAR - off) / (NEAR - CLOSE), 0.0, 1.0), 0.0)
         by = (1.0 - square) * bearing + square * askew
@@ -434,10 +442,12 @@ class Walkers:
         start = clips.facing[p.hierarchy.targets.start[t]]
         anchor = planar_compose(self.shown.lag[who], self.cast.anchor[who])
         there = planar_apply(anchor, planar_apply(start, p.place[t]))
-        off = (self._object[who] - there)[:, [0, 2]] * share[:, None]
-        shift[who, :2] = turned_by(-self.facing[who, 2], off)
         askew = wrap_angle(self._way[who] - anchor[:, 2])
-        shift[who, 2] = np.nan_to_num(askew) * share
+        here = self.facing[who]
+        there = here[:, :2] + turned_by(askew, there[:, [0, 2]] - here[:, :2])  # once it has turned
+        off = (self._object[who][:, [0, 2]] - there) * share[:, None]
+        shift[who, :2] = turned_by(-here[:, 2], off)
+        shift[who, 2] = askew * share
 
     def aim(self, k: int, place: np.ndarray) -> None:
         """The object [3] m of the target motion that character k does has moved."""
