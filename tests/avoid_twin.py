@@ -89,7 +89,7 @@ class Twin:
         return 0.5 * (parts.start[part] + parts.stop[part] - 1)
 
     def candidates(
-        self, standing: Standing, aim: float
+        self, standing: Standing, aim: float, earlier: int
     ) -> Iterator[tuple[tuple[int, ...], int, float]]:
         """Paths, their parts and the frames to the parts' middles (Eq. 1)."""
         fps, table = self.library.clips.fps, self.library.table
@@ -100,7 +100,7 @@ class Twin:
                 if middle > 0 and low < middle < high:
                     yield (), p, middle
 
-        def onward(state: int, path: tuple[int, ...], gone: float):
+        def onward(state: int, path: tuple[int, ...], gone: float, earlier: int):
             for a in range(table.action_start[state], table.action_start[state + 1]):
                 s = int(table.stretch[a])
                 for p in self.parts_in(s):
@@ -108,12 +108,13 @@ class Twin:
                     if low < middle < high:
                         yield (*path, s), p, middle
                 after = gone + table.last[s] - table.first[s] + 1
-                if after < high and not self.parts_in(s):
-                    yield from onward(int(table.target[s]), (*path, s), after)
+                left = earlier - bool(self.parts_in(s))
+                if after < high and left >= 0:
+                    yield from onward(int(table.target[s]), (*path, s), after, left)
 
         found = np.flatnonzero(table.state_frame == standing.stop)
         if len(found):
-            yield from onward(int(found[0]), (), standing.stop - standing.phase)
+            yield from onward(int(found[0]), (), standing.stop - standing.phase, earlier)
 
     # Time ----------------------------------------------------------------------------------------
 
@@ -297,10 +298,14 @@ class Twin:
         if aim > rules.ahead:
             return "early", aim, []
         rest = [g for g in given if g is not None]
-        weighed = [
-            self.weigh(standing, path, part, middle, aim, rest)
-            for path, part, middle in self.candidates(standing, aim)
-        ]
+        weighed = []
+        for earlier in (0, 1):
+            weighed = [
+                self.weigh(standing, path, part, middle, aim, rest)
+                for path, part, middle in self.candidates(standing, aim, earlier)
+            ]
+            if any(w.outcome == VALID and w.overlap > 0.0 for w in weighed):
+                break
         if not weighed:
             return "no candidate", aim, []
         order = sorted(

@@ -411,7 +411,7 @@ def _build_index(search: AvoidanceSearch) -> cells.Index:
     key, of = np.zeros(1 << 16, dtype=np.int32), np.zeros(1 << 16, dtype=np.int32)
     for state, frame in enumerate(states.tolist()):
         count = paths.enumerate_paths(
-            state, 0.0, -1.0, horizon, graph, room.node, room.way, room.gone, room.path,
+            state, 0.0, -1.0, horizon, 0, graph, room.node, room.way, room.gone, room.path,
             room.length, room.part,
         )  # fmt: skip
         if count > MOST_PATHS:

@@ -98,7 +98,7 @@ class CounterSearch:
         room, now = search._room(), _now(standing)
         fps = self.graph.fps
         count = paths.enumerate_paths(
-            state, standing.stop - standing.phase, 0.0, within * fps, self.graph, room.node,
+            state, standing.stop - standing.phase, 0.0, within * fps, 0, self.graph, room.node,
             room.way, room.gone, room.path, room.length, room.part,
         )  # fmt: skip
         count = min(count, len(room.length))

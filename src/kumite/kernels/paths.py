@@ -31,10 +31,10 @@ def soonest(action_start, stretch, first, last, target, part_of, middle, out):
 
 
 @lean_kernel
-def enumerate_paths(state, ahead, low, high, graph, node, way, gone, path, length, part):
+def enumerate_paths(state, ahead, low, high, earlier, graph, node, way, gone, path, length, part):
     """Paths [C, D] from a state whose last edge avoids between ``low`` and ``high`` frames from now
-    (exclusive), ``ahead`` of which pass before the state, and no other edge does. Depth first,
-    actions in order.
+    (exclusive), ``ahead`` of which pass before the state. Of the other edges at most
+    ``earlier`` avoid, too. Depth first, actions in order.
 
     length [C], part [C]: edges of each, and the part. node, way, gone [D]: room to work in. Returns
     how many there are, C + 1 where there are more than there is room for; those of more than D
@@ -67,7 +67,13 @@ def enumerate_paths(state, ahead, low, high, graph, node, way, gone, path, lengt
         after = gone[d] + graph.last[s] - before
         to = graph.target[s]
         if graph.part_of[s] < graph.part_of[s + 1]:
-            continue  # whoever avoids once for nothing, to avoid again, moves more than need be
+            left = earlier - 1
+            for k in range(d):
+                other = graph.stretch[way[k] - 1]
+                if graph.part_of[other] < graph.part_of[other + 1]:
+                    left -= 1
+            if left < 0:
+                continue
         if d + 1 < DEPTH and after + graph.soonest[to] < high:
             d += 1
             node[d], gone[d], way[d] = to, after, graph.action_start[to]
@@ -127,16 +133,21 @@ def find(
             )  # fmt: skip
             if avoids:
                 return count, best, True, True
-    count = present
-    if state >= 0:
-        count += enumerate_paths(
-            state, ahead, low, high, graph, room.node, room.way, room.gone, path[present:],
-            length[present:], part[present:],
+    count, best, avoids = 0, -1, False
+    # Who avoids once for nothing, to avoid again, moves more than need be: only if all else fails.
+    for earlier in range(2):
+        count = present
+        if state >= 0:
+            count += enumerate_paths(
+                state, ahead, low, high, earlier, graph, room.node, room.way, room.gone,
+                path[present:], length[present:], part[present:],
+            )  # fmt: skip
+        best, avoids = weigh_all(
+            min(count, length.shape[0]), path, length, part, main, aim, now, graph, volumes,
+            attacks, weighing, masks, room.scratch, room.outcome, room.scores,
         )  # fmt: skip
-    best, avoids = weigh_all(
-        min(count, length.shape[0]), path, length, part, main, aim, now, graph, volumes, attacks,
-        weighing, masks, room.scratch, room.outcome, room.scores,
-    )  # fmt: skip
+        if avoids:
+            break
     return count, best, avoids, False
 
 
