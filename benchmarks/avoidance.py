@@ -226,7 +226,7 @@ def displacement(search: AvoidanceSearch, asked: Asked, path: Sequence[int], par
     room, edges = search._room(), np.array(path, dtype=np.int32)
     now = kernels.Now(
         np.asarray(standing.anchor, dtype=float), standing.phase, standing.stop, standing.stretch,
-        standing.slowness,
+        standing.slowness, np.zeros((2, 3, 3)),
     )  # fmt: skip
     kernels.lay(edges, len(edges), now, graph, room.scratch)
     first, most = None, np.zeros(len(search.spheres))

@@ -12,9 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from kumite.body import Spheres
+from kumite.clip import SIDES
 from kumite.control.attack import NEAR, Attack
 from kumite.control.avoidance import END_EFFECTORS, AvoidanceRules, Standing
 from kumite.graph import Library
+from kumite.synthesis.cast import JOIN_HALF_LIFE, LONGEST_FOOT_OFFSET, ROOT_HALF_LIFE
 
 VALID, HIT, STIFF, TOO_FAST = "valid", "hit", "stiff", "too fast"
 
@@ -64,6 +66,11 @@ class Twin:
         position, world = clips.world
         self.centre = spheres.at(position, world).astype(np.float32).astype(float)  # [F, B, 3]
         self.radius = spheres.radius.astype(np.float32).astype(float)
+        self.spheres, self.position, skeleton = spheres, position, clips.skeleton
+        self.legs = [
+            [skeleton.joint(f"{side}_{part}") for part in ("thigh", "shin", "foot")]
+            for side in SIDES
+        ]
         table, fps = library.table, clips.fps
         ends = [clips.skeleton.joint(role) for role in END_EFFECTORS]
         fastest = []
@@ -180,6 +187,88 @@ class Twin:
             played = 1.0 + (want - first) / (second - first) if second - first > 1e-9 else 1.0
         return scale, played, upto, at, shown(played, at) / fps
 
+    # What joins leave ---------------------------------------------------------------------------
+
+    def tracked(self, frame: int) -> np.ndarray:
+        """Root, left and right ankle [3, 3] at a library frame."""
+        root = self.library.clips.root_position[frame]
+        return np.array([root, *(self.position[frame, leg[2]] for leg in self.legs)])
+
+    def steps(self, frame: int) -> np.ndarray:
+        """How these move from the frame before in the clip, by the frame [3, 3]."""
+        of = self.library.clips.clip_of_frame
+        before = frame - 1 if frame > 0 and of[frame - 1] == of[frame] else frame
+        return self.tracked(frame) - self.tracked(before)
+
+    def offsets(self, standing: Standing, edges: list[Edge], upto, at, when) -> tuple:
+        """Offsets [n, 3, 3] of root and ankles as each frame is come to, and as it is left."""
+        fps, table = self.library.clips.fps, self.library.table
+        half = np.array([ROOT_HALF_LIFE, JOIN_HALF_LIFE, JOIN_HALF_LIFE])
+        rate = 2 * np.log(2) / half
+        steps = np.diff(when)
+        # The matrix exponential of a critically damped spring, [n - 1, 3, 2, 2].
+        y, t = rate, steps[:, None]
+        fades = np.array([[1 + y * t, t + 0 * y], [-y * y * t, 1 - y * t]]) * np.exp(-y * t)
+        fades = np.moveaxis(fades, (0, 1), (2, 3))
+        state = np.zeros((2, 3, 3)) if standing.left is None else np.array(standing.left)
+        came, left, k = [], [], 0
+        for i in range(len(at)):
+            if i > 0:
+                frame = edges[k].stop - round(upto[k] - at[i])
+                new = np.einsum("pab,bpc->apc", fades[i - 1], state)
+                for s in range(2):
+                    short = np.hypot(*state[0, 1 + s, [0, 2]]) <= LONGEST_FOOT_OFFSET
+                    if self.library.contacts.on_ground[frame, s] and short:
+                        for axis in (0, 2):
+                            new[:, 1 + s, axis] = state[0, 1 + s, axis], 0.0
+                state = new
+            came.append(state[0].copy())
+            while k + 1 < len(edges) and upto[k] - at[i] < 1e-9:
+                old, nxt = edges[k], edges[k + 1]
+                source, target = old.stop, int(table.first[nxt.stretch]) - 1
+                if source != target:
+                    lasted = steps[i - 1] if i > 0 else standing.slowness / fps
+                    lasts = steps[i] if i < len(steps) else lasted
+                    place = [
+                        _set(e.anchor, self.tracked(f)) for e, f in ((old, source), (nxt, target))
+                    ]
+                    speed = [
+                        _set(np.array([0, 0, e.anchor[2]]), self.steps(f)) / t
+                        for e, f, t in ((old, source, lasted), (nxt, target, lasts))
+                    ]
+                    state = state + np.array([place[0] - place[1], speed[0] - speed[1]])
+                k += 1
+            left.append(state[0].copy())
+        return np.array(came), np.array(left)
+
+    def shown(self, body, edges, phase, edge, x, at, offsets) -> np.ndarray:
+        """Spheres [T, B, 3] of a captured body as they will be shown."""
+        came, left = offsets
+        i = np.maximum(1, np.searchsorted(at, x, side="left"))
+        part = ((x - at[i - 1]) / (at[i] - at[i - 1]))[:, None, None]
+        begin = np.where(part > 0, left[i - 1], came[i - 1])
+        offset = begin + part * (came[i] - begin)
+        stop, anchor = (
+            np.array([getattr(edges[k], name) for k in edge]) for name in ("stop", "anchor")
+        )
+        row = np.minimum(phase.astype(int), stop)
+        after = np.minimum(row + 1, stop)
+        legs = self.position[:, self.legs]  # [F, 2, 3, 3]
+        joints = legs[row] + (phase - row)[:, None, None, None] * (legs[after] - legs[row])
+        joints = np.array([_set(a, j) for a, j in zip(anchor, joints)])
+        root = offset[:, 0, None]
+        moves = np.tile(root, (1, len(self.radius), 1))
+        for s in range(2):
+            h, k, a = np.moveaxis(joints[:, s], 1, 0)
+            knee, ankle = _bent(h, k, a, h + root[:, 0], a + offset[:, 1 + s])
+            ways = [root, (knee - k)[:, None], (ankle - a)[:, None], (ankle - a)[:, None]]
+            for bone, joint in enumerate(self.legs[s]):
+                some = np.flatnonzero(self.spheres.joint == joint)
+                to = self.library.clips.skeleton.offsets[self.legs[s][min(bone + 1, 2)]]
+                along = np.clip(self.spheres.centre[some] @ to / (to @ to), 0, 1)[:, None]
+                moves[:, some] = ways[bone] + along * (ways[bone + 1] - ways[bone])
+        return body + moves
+
     # Distances -----------------------------------------------------------------------------------
 
     def bodies(self, edges: list[Edge], upto: np.ndarray, x: np.ndarray):
@@ -222,13 +311,18 @@ class Twin:
             if not 1.0 / rules.most <= s <= rules.most:
                 return Weighed(path, part, TOO_FAST)
         d, d0, overlap = np.inf, np.inf, 0.0
+        offsets = self.offsets(standing, edges, upto, at, when)
         for m, (t, lasts, centre, radius) in enumerate(given):
             some = t <= when[-1]
             if not some.any():
                 continue
             t, lasts, centre = t[some], lasts[some], centre[some]
-            body, phase, edge = self.bodies(edges, upto, np.interp(t, when, at))
-            nearest = self.smallest(centre, radius, body)
+            x = np.interp(t, when, at)
+            body, phase, edge = self.bodies(edges, upto, x)
+            shown = body
+            if rules.joins:
+                shown = self.shown(body, edges, phase, edge, x, at, offsets)
+            nearest = self.smallest(centre, radius, shown)
             if nearest < rules.clearance:
                 return Weighed(path, part, HIT)
             if m > 0:
@@ -319,6 +413,35 @@ class Twin:
         )
         weighed = [weighed[c] for c in order]
         return ("found" if weighed[0].outcome == VALID else "hit"), aim, weighed
+
+
+def _set(anchor: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Library points [..., 3] in the scene."""
+    out = np.array(points, dtype=float)
+    out[..., [0, 2]] = anchor[:2] + out[..., [0, 2]] @ turned(anchor[2]).T
+    return out
+
+
+def _bent(h, k, a, hip, goal) -> tuple[np.ndarray, np.ndarray]:
+    """Knees and ankles [T, 3] of legs h, k, a that are taken to a hip and reach for a goal."""
+
+    def norm(v):
+        return np.linalg.norm(v, axis=1, keepdims=True)
+
+    thigh, shin, was, far = norm(k - h), norm(a - k), norm(a - h), norm(goal - hip)
+    longest = np.maximum(0.999 * (thigh + shin), was)
+    want = np.clip(far, np.abs(thigh - shin) + 1e-4, longest)
+    old, new = (a - h) / was, (goal - hip) / far
+    axis, c = np.cross(old, new), np.sum(old * new, axis=1, keepdims=True)
+    s = norm(axis)
+    axis = axis / np.maximum(s, 1e-12)
+    knee = k - h  # Rodrigues
+    onto = np.sum(axis * knee, axis=1, keepdims=True)
+    knee = knee * c + np.cross(axis, knee) * s + axis * onto * (1 - c)
+    side = knee - np.sum(knee * new, axis=1, keepdims=True) * new
+    side /= norm(side)
+    angle = np.arccos(np.clip((thigh**2 + want**2 - shin**2) / (2 * thigh * want), -1, 1))
+    return hip + thigh * (np.cos(angle) * new + np.sin(angle) * side), hip + want * new
 
 
 def _length(edges: list[Edge]) -> np.ndarray:

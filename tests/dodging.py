@@ -8,8 +8,10 @@ import numpy as np
 
 from kumite.clip import concatenate
 from kumite.control.attack import Attack, thrown
-from kumite.control.avoidance import AvoidanceSearch, Standing
+from kumite.control.avoidance import AvoidanceSearch, Standing, _now
 from kumite.graph import Library, build_avoidance_library
+from kumite.kernels import avoid as kernels
+from kumite.kernels import joins
 from kumite.performer.avoidance import AVOIDANCE
 from kumite.performer.moves import Move
 from kumite.performer.take import perform_take, vary
@@ -34,7 +36,7 @@ def few() -> Library:
 
 
 def somewhere(rng: np.random.Generator, library: Library) -> Standing:
-    """Anywhere in a stretch, played at any speed."""
+    """Anywhere in a stretch, played at any speed, after a join or not."""
     table = library.table
     stretch = int(rng.integers(len(table.first)))
     low, high = int(table.first[stretch]) - 1, int(table.last[stretch])
@@ -43,7 +45,11 @@ def somewhere(rng: np.random.Generator, library: Library) -> Standing:
     )
     anchor = np.array([*rng.uniform(-3, 3, 2), rng.uniform(-np.pi, np.pi)])
     slowness = float(rng.choice([1.0, 1.0, 0.5, 1.4, 2.5]))
-    return Standing(anchor, phase, high, stretch, slowness)
+    left = None
+    if rng.random() < 0.5:
+        size = np.array([[0.03, 0.12, 0.12], [0.1, 0.3, 0.3]])[:, :, None]
+        left = rng.normal(0.0, size, (2, 3, 3)) * [1.0, 0.1, 1.0]
+    return Standing(anchor, phase, high, stretch, slowness, left)
 
 
 def at_body(
@@ -70,3 +76,41 @@ def at_body(
     velocity = (goal - place) / lasts
     velocity[1] += 0.5 * 9.81 * lasts
     return thrown(place, velocity, float(rng.uniform(*radius)), when=now)
+
+
+class Foresight:
+    """What a search reckons with along a path, all of whose edges are slowed by ``scale``."""
+
+    def __init__(
+        self, search: AvoidanceSearch, standing: Standing, path: list[int], scale: float
+    ) -> None:
+        self.search, self.now, self.path = search, _now(standing), np.array(path, dtype=np.int32)
+        self.room = search._room().scratch
+        graph, room, count = search.graph, self.room, len(path)
+        kernels.lay(self.path, count, self.now, graph, room)
+        room.adjustable[: count + 1] = True
+        ramp = search.weighing.ramp * graph.fps
+        frames = kernels.fill(count + 1, room.upto, room.adjustable, ramp, room.at, room.weight)
+        kernels.phase_times(
+            room.at, room.weight, frames, scale, ramp, self.now.slowness, graph.fps, room.when
+        )
+        self.at, self.when = room.at[:frames].copy(), room.when[:frames].copy()
+        self.ends = float(self.when[-1])
+        joins.follow(self.path, count, frames, np.inf, self.now, graph, room)
+
+    def at_time(self, t: float) -> tuple[np.ndarray, np.ndarray]:
+        """Spheres [B, 3] as captured and as they will be shown, ``t`` s from now."""
+        graph, room, volumes = self.search.graph, self.room, self.search.volumes
+        step = max(1, int(np.searchsorted(self.when, t - 1e-9)))
+        way = (t - self.when[step - 1]) / (self.when[step] - self.when[step - 1])
+        x = self.at[step - 1] + way * (self.at[step] - self.at[step - 1])
+        k = int(np.searchsorted(room.upto[: len(self.path)], x - 1e-9))
+        phase, last = kernels.phase_at(x, k, self.path, self.now, graph, room)
+        row = min(int(phase + 1e-9), last)
+        share, after, frame = phase - row, min(row + 1, last), room.anchor[k]
+        moved, body = np.zeros((joins.PLACES, 3)), np.zeros((3, len(self.search.spheres)))
+        kernels.put_body(volumes, 0, body.shape[1], row, share, after, frame, body)
+        captured = body.T.copy()
+        joins.displace(row, share, after, frame, step, way, graph.joins, room, moved)
+        joins.shift_body(volumes, 0, body.shape[1], moved, body)
+        return captured, body.T.copy()

@@ -14,11 +14,14 @@ from hypothesis import strategies as st
 from kumite.annotate import no_avoidance
 from kumite.control.attack import Attack, packed, thrown
 from kumite.control.avoidance import AvoidanceRules, AvoidanceSearch, Outcome, Standing
+from kumite.control.volumes import hung
 from kumite.errors import KumiteError
 from kumite.kernels import avoid as kernels
+from kumite.kernels.joins import ANKLE
 from kumite.rotation import planar_apply
+from kumite.synthesis import Cast
 from tests.avoid_twin import Twin
-from tests.dodging import at_body, few, somewhere
+from tests.dodging import Foresight, at_body, few, somewhere
 
 COUNTS = {kernels.VALID: "valid", kernels.STIFF: "stiff", kernels.TOO_FAST: "too fast"}
 
@@ -28,7 +31,7 @@ def searching(**rules) -> AvoidanceSearch:
     return AvoidanceSearch(few(), AvoidanceRules(**rules))
 
 
-def case(seed: int, attacks: int = 1):
+def case(seed: int, attacks: int = 1, radius: tuple[float, float] = (0.03, 0.12)):
     rng = np.random.default_rng(seed)
     search = searching()
     standing = somewhere(rng, few())
@@ -36,7 +39,7 @@ def case(seed: int, attacks: int = 1):
     return (
         standing,
         [
-            at_body(rng, search, standing, now, radius=(0.03, 0.12), seconds=(0.5, 1.4))
+            at_body(rng, search, standing, now, radius=radius, seconds=(0.5, 1.4))
             for _ in range(attacks)
         ],
         now,
@@ -111,7 +114,7 @@ def test_the_index_changes_nothing():
 def test_culling_changes_nothing():
     culled = 0
     for seed in range(400):
-        standing, coming, now = case(seed)
+        standing, coming, now = case(seed, radius=(0.1, 0.25))
         quick = searching(index=False).search(standing, coming, now)
         slow = searching(index=False, culling=False).search(standing, coming, now)
         assert (quick.outcome, quick.path, quick.others) == (slow.outcome, slow.path, slow.others)
@@ -153,6 +156,91 @@ def test_a_culled_candidate_is_hit(seed: int, radius: float, speed: float, secon
     assert (with_index.outcome, with_index.path) == (slow.outcome, slow.path)
 
 
+# What joins leave --------------------------------------------------------------------------------
+
+
+def played(seed: int, scale: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Two edges after some others, slowed by ``scale``: distances [T, B] m of the spheres foreseen
+    and of those captured from those shown, and s since the last join [T].
+    """
+    rng = np.random.default_rng(seed)
+    search, cast, table = searching(), Cast(few(), 1), few().table
+    fps, spheres = search.graph.fps, search.spheres
+
+    def onward(state: int) -> int:
+        return int(table.stretch[rng.integers(*table.action_start[state : state + 2])])
+
+    state = int(rng.integers(table.states))
+    cast.place(0, state, np.array([*rng.uniform(-2, 2, 2), rng.uniform(-3, 3)]))
+    path = [onward(state)]
+    while len(path) < 5:
+        path.append(onward(int(table.target[path[-1]])))
+    cast.show(0.0)
+    for stretch in path[:3]:
+        while not len(cast.waiting):
+            cast.advance()
+        cast.begin(np.array([0]), np.array([stretch]))
+    for _ in range(int(rng.integers(1, 4))):
+        if not len(cast.waiting):
+            cast.advance()
+    now = Standing(
+        cast.anchor[0].copy(), float(cast.phase[0]), int(cast.stop[0]), path[2], 1.0, cast.left(0)
+    )
+    foresight = Foresight(search, now, path[3:], scale)
+    ours, theirs, since, last, t = [], [], [], -np.inf, 0.0
+    rest = path[3:]
+    while (then := t + 1 / fps) <= foresight.ends:
+        cast.rate[0] = float(np.diff(np.interp([t, then], foresight.when, foresight.at))[0])
+        while len(cast.waiting) and rest:
+            cast.begin(np.array([0]), np.array([rest.pop(0)]))
+            last = t if cast.jump[0] else last
+        if len(cast.waiting):
+            break
+        cast.advance()
+        t = then
+        shown = spheres.at(cast.position[0], cast.world_wxyz[0])
+        captured, foreseen = foresight.at_time(t)
+        ours.append(np.linalg.norm(foreseen - shown, axis=1))
+        theirs.append(np.linalg.norm(captured - shown, axis=1))
+        since.append(t - last)
+    return np.array(ours), np.array(theirs), np.array(since)
+
+
+@pytest.mark.parametrize(("scale", "feet_off"), [(1.0, 0.01), (1.1, 0.06)])
+def test_what_is_foreseen_is_what_the_cast_shows(scale: float, feet_off: float):
+    """Legs at once, as their ankles are held where they were; the rest when joints have settled.
+    Slowed, a foot that is lifted between two shown frames fades a frame sooner or later.
+    """
+    found = [played(seed, scale) for seed in range(60)]
+    ours, theirs, since = (np.concatenate(some) for some in zip(*found))
+    between, _ = hung(few().clips.skeleton, searching().spheres)
+    legs, feet = np.any(between > 0, axis=1), np.all(between >= ANKLE, axis=1)
+    late = (since > 0.2) & np.isfinite(since)
+    assert late.sum() > 100 and (since < 0.2).sum() > 100
+    assert np.percentile(theirs[:, legs], 95) > 0.1  # it is not the capture
+    assert np.percentile(ours[:, legs], 95) < 0.03
+    assert np.percentile(ours[late][:, legs], 99) < feet_off
+    assert np.percentile(ours[late][:, ~legs], 99) < 0.03
+    assert np.median(ours[:, feet]) < 0.002
+
+
+def test_what_joins_leave_may_be_left_out():
+    differ = 0
+    for seed in range(60):
+        standing, coming, now = case(seed)
+        plain = searching(joins=False, index=False, culling=False)
+        found = plain.search(standing, coming, now)
+        without = plain.search(replace(standing, left=None), coming, now)
+        assert (found.outcome, found.path, found.costs) == (
+            without.outcome,
+            without.path,
+            without.costs,
+        ) or found.outcome != Outcome.FOUND
+        reckoned = searching(index=False, culling=False).search(standing, coming, now)
+        differ += found.counts != reckoned.counts
+    assert differ > 5
+
+
 # Nothing passes through --------------------------------------------------------------------------
 
 
@@ -164,18 +252,14 @@ def judged(attack: Attack, clearance: float = 0.0) -> tuple[str, float]:
     begins = int(search.graph.begins[part])
     still = search.volumes.centre.copy()
     still[:] = still[begins]  # everyone stays as the part begins
-    volumes = kernels.Volumes(
-        still,
-        search.volumes.radius,
-        search.volumes.group,
-        np.repeat(search.volumes.bound[begins : begins + 1], len(still), axis=0),
-    )
+    bound = np.repeat(search.volumes.bound[begins : begins + 1], len(still), axis=0)
+    volumes = search.volumes._replace(centre=still, bound=bound)
     facing = few().clips.facing.copy()
     facing[:] = facing[begins]
     graph = search.graph._replace(facing=facing)
     now = kernels.Now(
         np.zeros(3), float(few().table.first[stretch] - 1), int(few().table.last[stretch]),
-        stretch, 1.0,
+        stretch, 1.0, np.zeros((2, 3, 3)),
     )  # fmt: skip
     middle = 0.5 * (graph.begins[part] + graph.ends[part])
     aim = (middle - now.phase) / graph.fps

@@ -78,6 +78,31 @@ def test_a_ball_that_misses_by_a_centimetre_misses(speed: float):
         assert bool(hits) == met
 
 
+@pytest.mark.parametrize("lands", [True, False])
+def test_a_ball_that_lands_before_a_foot_does_not_strike_it(lands: bool):
+    """Not even in the frame in which it lands, which would end under the ground."""
+    body, capsules, roots = body_at_rest()
+    radius, speed = 0.11, 12.0
+    b = body.part("left_foot")
+    foot = capsules[:, 0, b].mean(axis=0)
+    goal = np.array([foot[0], radius, foot[2]])  # it comes down here …
+    fat = max(body.radius_start[b], body.radius_end[b])
+    if lands:  # … or so far before that it does not touch
+        before = capsules[:, 0, :, 2].max() + fat + radius + 0.02
+        goal[2] = max(before, goal[2])
+    struck = []
+    for share in np.linspace(0.05, 0.95, 10):  # of the frame in which it lands
+        balls = Balls(BallsSettings(radius=radius, gravity=0.0, pool=1), body, FPS)
+        velocity = np.array([0.0, -0.4 * speed, -speed])
+        balls.throw(goal - velocity * (5 + share) / FPS, velocity, 0.0)
+        hits = []
+        for _ in range(6):
+            hits += balls.step(roots, np.stack([capsules, capsules]))
+        assert balls.attack[0] is None
+        struck.append(bool(hits))
+    assert not any(struck) if lands else all(struck)
+
+
 def test_a_ball_is_where_its_attack_says():
     body, capsules, roots = body_at_rest()
     balls = Balls(BallsSettings(), body, FPS)

@@ -155,7 +155,7 @@ def test_controls_act_on_the_next_search_and_no_other(avoiders: Library):
     assert stage.search.settings.weights == (1.0, 3.0, 1.0)
     assert stage.search.settings.window == 2.0 and stage.search.weighing.clearance == 0.1
     assert stage.dodgers.search is stage.search and before.settings.window == 1.0
-    assert before.weighing.clearance == 0.04
+    assert before.weighing.clearance == 0.02
     assert stage.search.index is before.index and stage.search.masks is before.masks
     stage.reset(2)
     assert stage.dodgers.search.settings.window == 2.0

@@ -17,17 +17,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kumite.body import Spheres, lay_spheres
-from kumite.clip import SIDES, ClipSet
+from kumite.clip import SIDES
 from kumite.control.attack import Attack, packed
+from kumite.control.volumes import joins_of, volumes_of
 from kumite.errors import KumiteError, unknown
 from kumite.graph import Library
 from kumite.kernels import avoid as kernels
 from kumite.kernels import cells, paths
+from kumite.kernels.joins import PLACES
 from kumite.rotation import planar_compose, planar_inverse
 
 NONE = -1
 END_EFFECTORS = tuple(f"{side}_{part}" for part in ("hand", "foot") for side in SIDES)
-GROUP = 8  # spheres that are looked at together, or not at all
 MOST_OTHERS = 32  # next best paths that are told
 TUNABLE = ("window", "weights", "enough", "far", "most", "clearance", "wide", "ahead")
 MOST_PATHS = 50_000  # candidates of one search; what comes after them is not weighed
@@ -51,6 +52,7 @@ class AvoidanceRules:
     wide: float = 0.10  # m at which an attack passes by and nothing is done about it
     ahead: float = 2.0  # s before an attack's middle from which avoiding it is thought about
     horizon: float = 1.5  # s to which the index looks ahead
+    joins: bool = True  # whether what joins leave is reckoned with
     index: bool = True
     culling: bool = True
 
@@ -87,6 +89,7 @@ class Standing:
     stop: int  # library frame at which the present edge ends
     stretch: int = NONE  # the present edge, NONE before any
     slowness: float = 1.0  # s of play for 1 s of capture, now
+    left: np.ndarray | None = None  # [2, 3, 3] of joins, as Cast.left says; by default nothing
 
 
 @dataclass(frozen=True)
@@ -164,7 +167,7 @@ class AvoidanceSearch:
         self.library, self.settings = library, settings or AvoidanceRules()
         clips = library.clips
         self.spheres = spheres or lay_spheres(clips.skeleton)
-        self.volumes = _volumes(clips, self.spheres)
+        self.volumes = volumes_of(clips, self.spheres)
         parts = library.avoidance
         part_of, which = library.parts_of_stretch
         if len(which) == 0:
@@ -199,6 +202,7 @@ class AvoidanceSearch:
             ((speed < s.slow) & (speed > s.still)) | still,
             soonest,
             float(clips.fps),
+            joins_of(library, s.joins),
         )
         self.weighing = self._weighing(s)
         self._local = threading.local()
@@ -238,8 +242,10 @@ class AvoidanceSearch:
         origin = np.stack([root[:, 0] - half, np.zeros(count), root[:, 2] - half], axis=1)
         bits = np.zeros((count, cells.SLICES, cells.PIXELS), dtype=np.uint64)
         least = 0.10
+        # A leg may be shown elsewhere than captured; what hangs from the root goes where it does.
+        some = np.flatnonzero((self.volumes.between == 0).all(axis=1))
         cells.draw_masks(
-            self.volumes.centre, self.volumes.radius, self.graph.begins[:count],
+            self.volumes.centre[:, :, some], self.volumes.radius[some], self.graph.begins[:count],
             self.graph.ends[:count], least, origin, bits,
         )  # fmt: skip
         return kernels.Masks(bits, origin, cells.PIXEL, cells.SLICE, least)
@@ -339,12 +345,14 @@ class AvoidanceSearch:
             spheres, edges = len(self.spheres), kernels.DEPTH + 1
             groups = len(self.volumes.group) - 1
             frames = kernels.MOST_FRAMES
+            shapes = [(3, spheres), (4, groups)] * 3
+            shapes += [(2, 3, 3), (frames, 2, 3, 3), (2, PLACES, 3)]
             self._local.room = _Room(
                 kernels.Scratch(
                     np.zeros((edges, 4)), np.zeros(edges), np.zeros(edges, dtype=bool),
                     np.zeros(frames), np.zeros(frames), np.zeros(frames),
                     np.zeros(0, dtype=np.int32),
-                    *(np.zeros(shape) for _ in range(3) for shape in ((3, spheres), (4, groups))),
+                    *(np.zeros(shape) for shape in shapes),
                 ),
                 np.zeros(kernels.DEPTH, dtype=np.int64),
                 np.zeros(kernels.DEPTH, dtype=np.int64),
@@ -369,20 +377,8 @@ def _now(standing: Standing) -> kernels.Now:
         int(standing.stop),
         int(standing.stretch),
         float(standing.slowness),
+        np.zeros((2, 3, 3)) if standing.left is None else np.asarray(standing.left, dtype=float),
     )
-
-
-def _volumes(clips: ClipSet, spheres: Spheres) -> kernels.Volumes:
-    """Spheres of all frames, and spheres around groups of neighbours."""
-    centre, radius = spheres.of_frames(clips), spheres.radius.astype(np.float32)
-    group = np.unique(np.append(np.arange(0, len(spheres), GROUP), len(spheres)))
-    bound = np.zeros((len(clips), 4, len(group) - 1), dtype=np.float32)
-    for g, (low, high) in enumerate(zip(group[:-1], group[1:])):
-        some = centre[:, :, low:high]
-        middle = some.mean(axis=2, dtype=np.float64)
-        reach = np.linalg.norm(some - middle[:, :, None], axis=1) + radius[low:high]
-        bound[:, :3, g], bound[:, 3, g] = middle, reach.max(axis=1) + 1e-5  # float32's rounding
-    return kernels.Volumes(centre, radius, group, bound)
 
 
 def fastest_end_effector(library: Library) -> np.ndarray:
@@ -420,8 +416,9 @@ def _build_index(search: AvoidanceSearch) -> cells.Index:
                 f"{s.horizon} s of a state; expected fewer (a shorter horizon, fewer transitions)"
             )
         now = kernels.Now(
-            planar_inverse(search.library.clips.facing[frame]), float(frame), frame, NONE, 1.0
-        )
+            planar_inverse(search.library.clips.facing[frame]), float(frame), frame, NONE, 1.0,
+            np.zeros((2, 3, 3)),
+        )  # fmt: skip
         box[state] = [[np.inf] * 3, [-np.inf] * 3]
         while True:
             entries = cells.enter(

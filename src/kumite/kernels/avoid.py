@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kumite.kernels.jit import lean_kernel
+from kumite.kernels.joins import Joins, displace, follow, shift_body, shift_bounds
 from kumite.kernels.warp import carried, fill, phase_times, solve
 
 DEPTH = 32  # edges of a path at most
@@ -34,6 +35,10 @@ class Volumes(NamedTuple):
     radius: np.ndarray  # [B] float32 m
     group: np.ndarray  # [G + 1] spheres of group g are group[g]:group[g + 1]
     bound: np.ndarray  # [F, 4, G] float32, x, y, z and radius of a sphere around each group
+    between: np.ndarray  # [B, 2] places (joins.PLACES) that a sphere hangs between …
+    along: np.ndarray  # [B] … and how far from the one to the other
+    group_along: np.ndarray  # [G] the same of a group's middle: its spheres share their places
+    group_spread: np.ndarray  # [G] how much farther one of them is along
 
 
 class Graph(NamedTuple):
@@ -53,6 +58,7 @@ class Graph(NamedTuple):
     quickens: np.ndarray  # [L] bool, may be sped up
     soonest: np.ndarray  # [N] frames at least from a state to the middle of a part
     fps: float
+    joins: Joins
 
 
 class Attacks(NamedTuple):
@@ -74,6 +80,7 @@ class Now(NamedTuple):
     stop: int  # library frame at which the present edge ends
     stretch: int  # the present edge
     slowness: float  # s of play for 1 s of capture, now
+    left: np.ndarray  # [2, 3, 3] of joins: offsets of root and ankles and their velocities, scene
 
 
 class Weighing(NamedTuple):
@@ -90,7 +97,8 @@ class Weighing(NamedTuple):
 
 
 class Masks(NamedTuple):
-    """Where the body is throughout a part, for attacks no smaller than ``least``: one bit a pixel.
+    """Where the body without its legs is throughout a part, as captured, for attacks no smaller
+    than ``least``: one bit a pixel.
 
     In nine horizontal slices (section 5.2), :mod:`kumite.kernels.cells`.
     """
@@ -118,6 +126,9 @@ class Scratch(NamedTuple):
     bound: np.ndarray  # [4, G]
     before: np.ndarray  # [3, B] body at the sample before
     before_bound: np.ndarray  # [4, G]
+    left: np.ndarray  # [2, 3, 3] offsets and velocities on their way along a path
+    offset: np.ndarray  # [frames, 2, 3, 3] offsets as a frame is come to, and as it is left
+    moved: np.ndarray  # [2, PLACES, 3] how far places are moved, at a sample and at the one before
 
 
 @lean_kernel
@@ -341,6 +352,9 @@ def weigh(
 
     (e, e_avoidance, e_body, e_timescale, e', d, d0, s). main: the attack to be avoided, whose time
     is ``aim`` [s]; of the others it is enough not to be hit. masks: see :func:`certainly_hit`.
+
+    Hit or not and d are of the body as it will be shown, with what joins leave; e' and d0 of the
+    capture: what place a part leaves is its own, whichever way it is come to.
     """
     scale, outcome = time_scale(path, count, part, aim, now, graph, weighing, scratch)
     if outcome != VALID:
@@ -355,36 +369,38 @@ def weigh(
     if not (1.0 / most <= smooth <= most):
         return TOO_FAST
     begins, ends = float(graph.begins[part]), float(graph.ends[part])
-    frame = scratch.anchor[count]
+    frame, at, when = scratch.anchor[count], scratch.at, scratch.when
+    until = 0.0
+    for m in range(attacks.sample.shape[0] - 1):
+        until = max(until, attacks.when[attacks.sample[m + 1] - 1])
+    follow(path, count, frames, until, now, graph, scratch)
     # Where the attack passes while the body is away, a look at its masks is enough for many.
-    at, when = scratch.at, scratch.when
     own = now.phase if count == 0 else graph.first[path[count - 1]] - 1 - scratch.upto[count - 1]
-    low, high = attacks.sample[main], attacks.sample[main + 1]
-    spheres = attacks.count[main]
-    if masks.bits.shape[0] > 0:
-        step = 1
-        for n in range(low, high):
-            t = attacks.when[n]
-            if t < 0.0:
-                continue
-            while step < frames - 1 and when[step] < t:
-                step += 1
-            if when[step] < t:
-                break
-            share = (t - when[step - 1]) / (when[step] - when[step - 1])
-            phase = own + at[step - 1] + share * (at[step] - at[step - 1])
-            if phase < begins or phase > ends:
-                continue
-            for i in range(spheres):
-                if attacks.radius[main, i] < masks.least:
-                    continue
-                px, py, pz = (
-                    attacks.centre[n, i, 0],
-                    attacks.centre[n, i, 1],
-                    attacks.centre[n, i, 2],
-                )
-                if certainly_hit(part, frame, px, py, pz, masks):
-                    return CULLED
+    step, reckoned = 1, graph.joins.reckoned
+    for n in range(attacks.sample[main], attacks.sample[main + 1]):
+        t = attacks.when[n]
+        if t < 0.0 or masks.bits.shape[0] == 0:
+            continue
+        while step < frames - 1 and when[step] < t:
+            step += 1
+        if when[step] < t:
+            break
+        share = (t - when[step - 1]) / (when[step] - when[step - 1])
+        phase = own + at[step - 1] + share * (at[step] - at[step - 1])
+        if phase < begins or phase > ends:
+            continue
+        x, y, z = 0.0, 0.0, 0.0  # by how much the root will be shown elsewhere
+        if reckoned:
+            root, then = scratch.offset[step - 1, 1, 0], scratch.offset[step, 0, 0]
+            x = root[0] + share * (then[0] - root[0])
+            y = root[1] + share * (then[1] - root[1])
+            z = root[2] + share * (then[2] - root[2])
+        for i in range(attacks.count[main]):
+            if attacks.radius[main, i] >= masks.least and certainly_hit(
+                part, frame, attacks.centre[n, i, 0] - x, attacks.centre[n, i, 1] - y,
+                attacks.centre[n, i, 2] - z, masks,
+            ):  # fmt: skip
+                return CULLED
     first = graph.begins[part]
     group, radius = volumes.group, volumes.radius
     put_body(volumes, 0, radius.shape[0], first, 0.0, first, frame, scratch.still)
@@ -395,6 +411,7 @@ def weigh(
         scratch.before,
         scratch.before_bound,
     )
+    moved, moved_before = scratch.moved[0], scratch.moved[1]
     depth, nearest, was = 0.0, np.inf, np.inf
     for turn in range(attacks.sample.shape[0] - 1):
         m = main if turn == 0 else (turn - 1 if turn <= main else turn)
@@ -418,6 +435,10 @@ def weigh(
             row, edge = min(max(int(phase), 0), last), k
             share, after = phase - row, min(row + 1, last)
             put_bounds(volumes, row, share, after, scratch.anchor[k], bound)
+            displace(
+                row, share, after, scratch.anchor[k], step, part_way, graph.joins, scratch, moved
+            )
+            shift_bounds(volumes, moved, bound)
             away = m == main and k == count and begins <= phase <= ends
             for i in range(attacks.count[m]):
                 r = attacks.radius[m, i]
@@ -436,11 +457,13 @@ def weigh(
                     # Only a group that can be nearer than what is nearest so far is looked into.
                     if far_off(qx, qy, qz, before_bound, px, py, pz, bound, g, seen, r) < least:
                         put_body(volumes, low, high, row, share, after, scratch.anchor[k], body)
+                        shift_body(volumes, low, high, moved, body)
                         if seen:
                             put_body(
                                 volumes, low, high, old_row, old_share, old_after,
                                 scratch.anchor[old_edge], before,
                             )  # fmt: skip
+                            shift_body(volumes, low, high, moved_before, before)
                             d = swept_gap(
                                 qx, qy, qz, before, px, py, pz, body, r, radius, low, high
                             )
@@ -465,6 +488,9 @@ def weigh(
             for g in range(bound.shape[1]):
                 for c in range(4):
                     before_bound[c, g] = bound[c, g]
+            for p in range(moved.shape[0]):
+                for c in range(3):
+                    moved_before[p, c] = moved[p, c]
             seen = True
         if m == main:
             nearest = least

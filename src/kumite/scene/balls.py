@@ -102,6 +102,10 @@ class Balls:
         # Free fall is exact, so that a ball is where its attack says.
         self.position[fly] += self.velocity[fly] * dt - [0.0, 0.5 * s.gravity * dt * dt, 0.0]
         self.velocity[fly, 1] -= s.gravity * dt
+        # Who lands on the way flies no farther: the rest of its way would be under the ground.
+        fallen = before[:, 1] - self.position[fly, 1]
+        lands = (before[:, 1] - self.radius[fly]) / np.maximum(fallen, 1e-12)
+        lands = np.where(self.position[fly, 1] < self.radius[fly], lands, 1.0)
         hits = []
         who, part, when = self._who[: len(fly)], self._part[: len(fly)], self._when[: len(fly)]
         radius = self.radius[fly]
@@ -112,7 +116,7 @@ class Balls:
         )  # fmt: skip
         for i, n in enumerate(fly.tolist()):
             if who[i] != NO_HIT:
-                if self.attack[n] is not None:
+                if self.attack[n] is not None and when[i] <= lands[i]:
                     hits.append((n, int(who[i]), int(part[i]), self.velocity[n].copy()))
                 self._bounce_off(n, before[i], capsules[1, :, who[i], part[i]], float(when[i]))
             self._fall(n, dt)

@@ -63,7 +63,7 @@ class DodgeSettings(Settings):
     avoidance: Annotated[Finite, Field(ge=0)] = 1.0  # weights
     body: Annotated[Finite, Field(ge=0)] = 1.0
     timescale: Annotated[Finite, Field(ge=0)] = 1.0
-    clearance: Annotated[Finite, Field(ge=0, le=1)] = 0.04  # m
+    clearance: Annotated[Finite, Field(ge=0, le=1)] = 0.02  # m
     most: Annotated[Finite, Field(ge=1, le=FASTEST)] = 4.0
     latency: Annotated[int, Field(ge=1, le=120)] = 1  # frames until a search is taken up
     spheres: str | None = None  # a file of the body's volume (kumite spheres); by default laid

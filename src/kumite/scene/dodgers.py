@@ -168,6 +168,7 @@ class Dodgers:
             int(cast.stop[k]),
             mind.stretch,
             1.0 / float(cast.rate[k]),
+            cast.left(k),
         )
 
     def _seen(self, mind: Mind, now: float) -> Menace | None:

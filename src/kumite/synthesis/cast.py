@@ -305,6 +305,22 @@ class Cast:
         """How far [K, 2, 3] planted feet are held from where the capture has them [m]."""
         return self._offsets.foot
 
+    def left(self, k: int) -> np.ndarray:
+        """What joins have left of a character's root, left and right ankle [2, 3, 3]: how far they
+        are shown from where the capture has them [m], and how fast that changes [m/s], in the
+        scene.
+        """
+        held = self._offsets
+        return np.stack(
+            [
+                np.concatenate([root[k, None], foot[k]])
+                for root, foot in (
+                    (held.root, held.foot),
+                    (held.root_velocity, held.foot_velocity),
+                )
+            ]
+        )
+
     def carry(self, k: int, way: np.ndarray) -> None:
         """Carry a character away over the ground by way [2] m; planted feet stay where they are."""
         self.anchor[k, :2] += way
