@@ -203,9 +203,10 @@ class Walkers:
     ) -> None:
         """Let character k begin target t now, from the pose it shows.
 
-        place [3] m: of the object: the motion is bent to meet it, if that takes no more than ``OFF``
-        and ``ASKEW``; None: as captured. normal: the way through it. Begun at the reference posture by who is prepared, else where, up to the
-        mark, the motion is most like what is shown.
+        place [3] m: of the object: the motion is bent to meet it, if that takes no more than
+        ``OFF`` and ``ASKEW``; None: as captured. normal: the way through it. Begun at the reference
+        posture by who is prepared, else where, up to the mark, the motion is most like what is
+        shown.
         """
         p, clips, cast = self.preparing, self.library.clips, self.cast
         h, now = p.hierarchy, self._moment(k)
