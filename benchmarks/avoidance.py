@@ -22,14 +22,12 @@ import numpy as np
 from reproduction import _put, _table
 
 from kumite import mocap
-from kumite.clip import concatenate
+from kumite.bench_avoidance import sixteen
 from kumite.control import cache_folder
 from kumite.control.attack import Attack, thrown
 from kumite.control.avoidance import Avoidance, AvoidanceSearch, Outcome, Standing
 from kumite.graph import Library, build_avoidance_library, builtin_library
 from kumite.kernels import avoid as kernels
-from kumite.performer.avoidance import AVOIDANCE
-from kumite.performer.take import perform_take, vary
 from kumite.rotation import planar_apply
 from kumite.scene import load_scene
 from kumite.scene.balls import BallsSettings, aimed
@@ -46,35 +44,11 @@ PAPER = {  # Table 1, ms: (index, culling)
     (True, False): 18,
     (False, False): 496,
 }
-SIXTEEN = (
-    "twist_left", "twist_right", "lean_left", "lean_right", "lean_back", "hollow", "bow", "duck",
-    "duck_left", "duck_right", "limbo", "sidestep_left", "sidestep_right", "step_back", "jump_up",
-    "jump_tuck",
-)  # fmt: skip
-REST = ("wait", "shuffle", "step_forward", "turn_left", "turn_right")
-SECONDS = 160.0  # of the paper's graph
 REAL = ("1_avoid", "3_avoid", "3_pass_duck", "3_pass_jump", "1_jump", "1_jump_1", "1_jump_2",
         "1_jump_high", "1_jump_high_1", "3_jump", "3_walk_side", "3_walk_stop_walk")  # fmt: skip
 MOVES_ROOT = 0.3  # m: a part that carries the root farther is a step or a leap
 
 # Graphs ------------------------------------------------------------------------------------------
-
-
-def sixteen(fps: float = 60.0) -> Library:
-    """As the paper's: 2 min 40 s with 16 different avoidance motions, each of them once."""
-    rng = np.random.default_rng(16)
-    labels, total, n = [], 0.0, 0
-    for label in rng.permutation(SIXTEEN).tolist():
-        labels.append(label)
-        total += AVOIDANCE.find(label).seconds
-    while total < 0.9 * SECONDS:  # takes settle between moves
-        labels.append(REST[n % len(REST)])
-        total += AVOIDANCE.find(labels[-1]).seconds
-        n += 1
-    order = rng.permutation(len(labels))
-    score = [vary(AVOIDANCE.find(labels[k]), AVOIDANCE, rng) for k in order]
-    clip, _ = perform_take("sixteen", score, AVOIDANCE, rng=rng)
-    return build_avoidance_library(concatenate([clip], fps))
 
 
 def real() -> Library:

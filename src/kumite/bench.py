@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from kumite.bench_avoidance import avoidance_figures
 from kumite.bench_preparation import preparation_figures
 from kumite.errors import KumiteError
 
@@ -442,58 +443,7 @@ def _looked_at(folder: Path) -> float:
 
 
 _FIGURES |= preparation_figures(_best)
-
-
-@cache
-def _dodging() -> Any:
-    """A search in the built-in performer's graph, and throws at who stands at a state of it."""
-    from kumite.control.attack import thrown
-    from kumite.control.avoidance import AvoidanceSearch, Standing
-    from kumite.graph import builtin_library
-    from kumite.scene.balls import BallsSettings, aimed
-
-    library = builtin_library(None, style="avoidance", level="avoidance")
-    search, rng, asked = AvoidanceSearch(library), np.random.default_rng(20110), []
-    table, facing = library.table, library.clips.facing
-    for stretch in rng.choice(len(table.first), 60):
-        frame = int(table.first[stretch])
-        body = search.volumes.centre[frame].T
-        goal = body[rng.integers(len(body))].astype(float)
-        place, velocity = aimed(rng, BallsSettings(), facing[frame], goal)
-        standing = Standing(np.zeros(3), float(frame), int(table.last[stretch]), int(stretch))
-        asked.append((standing, [thrown(place, velocity, 0.11)], 0.0))
-    return search, asked
-
-
-def _avoiding(indexed: bool) -> float:
-    """Seconds that a search takes, mean of those that the index answers: with it, or without."""
-    from dataclasses import replace
-
-    from kumite.control.avoidance import AvoidanceSearch
-
-    search, asked = _dodging()
-    known = [a for a in asked if search.search(*a).indexed] or asked
-    if not indexed:
-        search = AvoidanceSearch(search.library, replace(search.settings, index=False))
-    return _best(lambda: [search.search(*a) for a in known]) / len(known)
-
-
-@_figure("avoidance: a search that the index answers", "s", 0.0005)
-def _avoiding_indexed(folder: Path) -> float:
-    return _avoiding(True)
-
-
-@_figure("avoidance: the same without the index", "s", 0.01)
-def _avoiding_exhaustive(folder: Path) -> float:
-    return _avoiding(False)
-
-
-@_figure("avoidance: the index", "s", 5.0)
-def _avoiding_index(folder: Path) -> float:
-    from kumite.control.avoidance import AvoidanceSearch
-
-    library = _dodging()[0].library
-    return _best(lambda: AvoidanceSearch(library).index)
+_FIGURES |= avoidance_figures(_best)
 
 
 @_figure("kumite build from nothing compiled", "s", 90.0)

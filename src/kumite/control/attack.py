@@ -190,10 +190,8 @@ def packed(
             first -= 1
             when, centre = when.copy(), centre.copy()
             when[first], centre[first] = now, attack.at(now)
-        off = centre[first:, :, ::2] - place
-        close = np.flatnonzero(
-            (np.hypot(off[..., 0], off[..., 1]) < within + attack.radius).any(axis=1)
-        )
+        x, z = centre[first:, :, 0] - place[0], centre[first:, :, 2] - place[1]
+        close = (x * x + z * z < (within + attack.radius) ** 2).any(axis=1).nonzero()[0]
         if len(close):
             part = slice(first + close[0], first + close[-1] + 1)
             taken.append((when[part] - now, _lasts(when[part]), centre[part], attack.radius))
@@ -216,5 +214,7 @@ def packed(
 
 def _lasts(when: np.ndarray) -> np.ndarray:
     """The time [T] that each sample stands for: half of the way to its neighbours."""
-    half = 0.5 * np.diff(when)
-    return np.append(half, 0.0) + np.append(0.0, half)
+    half, out = 0.5 * (when[1:] - when[:-1]), np.zeros(len(when))
+    out[:-1] = half
+    out[1:] += half
+    return out
