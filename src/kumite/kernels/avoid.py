@@ -345,6 +345,40 @@ def certainly_hit(part, frame, px, py, pz, masks):
 
 
 @lean_kernel
+def glance(path, count, main, aim, frames, now, graph, volumes, attacks, weighing, scratch):
+    """Distances of an attack to the body as shown, and to the body as the part begins, at its last
+    sample up to ``aim``: the smallest are no larger. (inf, inf) where the path is
+    over by then, or the attack does not begin before.
+    """
+    n = attacks.sample[main]
+    while n + 1 < attacks.sample[main + 1] and attacks.when[n + 1] <= aim:
+        n += 1
+    at, when, t, step = scratch.at, scratch.when, attacks.when[n], 1
+    while step < frames - 1 and when[step] < t:
+        step += 1
+    if t < 0.0 or when[step] < t:
+        return np.inf, np.inf
+    part_way = (t - when[step - 1]) / (when[step] - when[step - 1])
+    x, k = at[step - 1] + part_way * (at[step] - at[step - 1]), 0
+    while k < count and x > scratch.upto[k]:
+        k += 1
+    phase, last = phase_at(x, k, path, now, graph, scratch)
+    row = min(max(int(phase), 0), last)
+    share, after, everyone = phase - row, min(row + 1, last), volumes.radius.shape[0]
+    moved, body = scratch.moved[0], scratch.body
+    displace(row, share, after, scratch.anchor[k], step, part_way, graph.joins, scratch, moved)
+    put_body(volumes, 0, everyone, row, share, after, scratch.anchor[k], body)
+    shift_body(volumes, 0, everyone, moved, body)
+    shown, still = np.inf, np.inf
+    for i in range(attacks.count[main]):
+        x, y, z = attacks.centre[n, i, 0], attacks.centre[n, i, 1], attacks.centre[n, i, 2]
+        r = attacks.radius[main, i]
+        shown = min(shown, gap(x, y, z, r, body, volumes.radius, 0, everyone))
+        still = min(still, gap(x, y, z, r, scratch.still, volumes.radius, 0, everyone))
+    return shown, still
+
+
+@lean_kernel
 def weigh(
     path, count, part, main, aim, now, graph, volumes, attacks, weighing, masks, scratch, out
 ):
@@ -412,10 +446,17 @@ def weigh(
         scratch.before_bound,
     )
     moved, moved_before = scratch.moved[0], scratch.moved[1]
-    depth, nearest, was = 0.0, np.inf, np.inf
+    depth, nearest = 0.0, np.inf
+    # How near it comes at the time that counts: what cannot come nearer is not looked into.
+    near_by, was = glance(
+        path, count, main, aim, frames, now, graph, volumes, attacks, weighing, scratch
+    )
+    if near_by < weighing.clearance:
+        return HIT
+    near_by, was = near_by + EPSILON, was + EPSILON
     for turn in range(attacks.sample.shape[0] - 1):
         m = main if turn == 0 else (turn - 1 if turn <= main else turn)
-        least = np.inf if m == main else weighing.clearance
+        least = near_by if m == main else weighing.clearance
         step, k, seen = 1, 0, False
         row, share, after, edge = 0, 0.0, 0, 0
         for n in range(attacks.sample[m], attacks.sample[m + 1]):
