@@ -149,3 +149,12 @@ def test_who_begins_outside_is_named():
         SceneSettings.model_validate(told)
     with pytest.raises(KumiteError, match="rules: arena"):
         Rules(arena=-1.0)
+
+
+def test_a_check_point_outside_is_refused():
+    fighter = '[[fighter]]\nname = "a"\nposition = [0, 1]\nagainst = "b"\n'
+    other = '[[fighter]]\nname = "b"\nposition = [0, -1]\nagainst = "a"\n'
+    point = "[[fighter.point]]\nplace = [0, 4]\n"
+    with pytest.raises(KumiteError, match=r"check point 0 of b: 4 m from the middle.*3 m"):
+        text = f'title = "t"\n{fighter}{other}{point}[bout]\narena = 3\n'
+        toml.parse(text, "t.toml", SceneSettings)

@@ -174,10 +174,24 @@ def test_every_throw_is_told_of_once():
     made = scene(2, 3, every=0.4)
     for _ in range(400):
         made.step()
-    ends = [e.data["attack"] for e in made.events if e.kind in ("struck", "avoided")]
+    ends = [e.data["attack"] for e in made.events if e.kind in ("struck", "avoided", "missed")]
     assert len(ends) == len(set(ends))
     thrown = [e.data["attack"] for e in made.events if e.kind == "throw"]
     assert set(ends) <= set(thrown) and len(ends) >= len(thrown) - 8
+
+
+def test_what_comes_near_nobody_is_not_avoided():
+    made = scene(1, 1, every=100.0)
+    here, ahead = made.root_position[0], np.array([0.0, 0.3, 5.0])
+    aside = np.array([3.0, 0.5, 0.0])
+    made.throw(here + aside + ahead, here + aside - ahead, 9.0)
+    made.throw(here + ahead, here, 9.0)
+    for _ in range(240):
+        made.step()
+    ends = {
+        e.data["attack"]: e.kind for e in made.events if e.kind in ("struck", "avoided", "missed")
+    }
+    assert ends[1] == "missed" and ends[2] in ("struck", "avoided")
 
 
 def test_avoiding_helps():

@@ -206,6 +206,11 @@ def test_bad_scene_files_say_what_is_wrong(text, wrong):
         toml.parse('title = "t"\n' + text, "t.toml", SceneSettings)
 
 
+def test_attackers_of_a_library_of_ones_own():
+    text = 'title = "t"\n' + DODGER + ATTACKER + 'library = "mine/boxer.kumite"\n'
+    assert toml.parse(text, "t.toml", SceneSettings).attacker[0].library == "mine/boxer.kumite"
+
+
 def test_a_scene_without_attackers_is_refused(avoiding, swordsman):
     with pytest.raises(KumiteError, match="who attacks"):
         EvasionScene(builtin_scenes()["dodgeball"], avoiding, swordsman)

@@ -267,7 +267,8 @@ def test_what_is_said_of_a_throw_and_a_search():
         return describe(Event(1, kind, "dodger", data))
 
     assert said("throw", attack=3, speed=9.96, ball="ball 1") == "ball 3 is thrown, 10.0 m/s"
-    assert said("avoided", attack=3) == "ball 3 has met nobody"
+    assert said("avoided", attack=3) == "ball 3 is avoided"
+    assert said("missed", attack=4) == "ball 4 comes near nobody"
     assert said("struck", attack=3, part="left_shin", speed=9.0, meant=True) == (
         "ball 3 → left shin, 9.0 m/s"
     )

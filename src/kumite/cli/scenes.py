@@ -79,7 +79,10 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
             found = builtin_library(cache, progress=stages, style=style, level=level)
         if settings.attacker:
             style = settings.attacker[0].library
-            attack = builtin_library(cache_folder(None), progress=stages, style=style)
+            if is_library(style):
+                attack = load_library(style)
+            else:
+                attack = builtin_library(cache_folder(None), progress=stages, style=style)
             stages("preparing the scene")
             training = Training(bars)
             return EvasionScene(settings, found, attack, seed=seed, cache=cache, progress=training)
@@ -159,6 +162,7 @@ def _avoiding(recording: Any) -> list[str]:
     outcomes = ", ".join(f"{name} {found.count(name)}" for name in sorted(set(found)))
     return [
         f"{kinds.count('throw')} balls thrown; {kinds.count('avoided')} attacks avoided, "
+        f"{kinds.count('missed')} missed anyway, "
         f"{kinds.count('struck')} balls struck somebody; searches: {outcomes or 'none'}"
     ]
 

@@ -79,6 +79,11 @@ class Attack:
         way = np.linalg.norm(np.diff(self.centre, axis=0), axis=2)
         return float((way / np.diff(self.when)[:, None]).max())
 
+    def nearest(self, body: np.ndarray, radius: np.ndarray) -> float:
+        """The smallest gap [m] to spheres [B, 3] of radii [B] that stay where they are."""
+        off = self.dense[-1][:, :, None] - body
+        return float((np.linalg.norm(off, axis=-1) - self.radius[:, None] - radius).min())
+
     def at(self, when: np.ndarray | float) -> np.ndarray:
         """Centres [..., I, 3] at times, at its ends before and after them."""
         t = np.clip(when, self.when[0], self.when[-1])

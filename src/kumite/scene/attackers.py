@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -26,6 +26,7 @@ from kumite.scene.fighters import Finite, Metres, Name, Settings
 from kumite.scene.recording import Recording
 from kumite.synthesis import Cast
 
+STYLES = ("boxing", "sword")
 FORESEEN = 600  # frames that may be known ahead at most
 
 
@@ -35,7 +36,8 @@ class AttackerSettings(Settings):
     name: Name
     position: tuple[Metres, Metres]  # m, x and z
     yaw_deg: Finite = 0.0  # 0 faces +Z
-    library: Literal["boxing", "sword"] = "boxing"  # of the built-in performer
+    # Of the built-in performer, "boxing" or "sword"; or a .kumite file.
+    library: Annotated[str, Field(min_length=1, max_length=4096)] = "boxing"
     approach: Annotated[Finite, Field(ge=0)] = 1.0  # weights of the behaviours
     strike: Annotated[Finite, Field(ge=0)] = 6.0
     facing: Annotated[Finite, Field(ge=0)] = 3.5
@@ -44,6 +46,10 @@ class AttackerSettings(Settings):
 
     @model_validator(mode="after")
     def _some_weight(self) -> AttackerSettings:
+        if self.library not in STYLES and not self.library.endswith(".kumite"):
+            raise ValueError(
+                f"library {self.library!r}: expected {' or '.join(STYLES)}, or a .kumite file"
+            )
         if self.approach + self.strike == 0:
             raise ValueError("all weights are 0; expected approach or strike above 0")
         return self

@@ -10,7 +10,7 @@ from pydantic import Field
 from kumite.body import Spheres, lay_body, load_spheres
 from kumite.clip import Skeleton
 from kumite.control.attack import thrown
-from kumite.control.avoidance import AvoidanceRules, AvoidanceSearch
+from kumite.control.avoidance import AvoidanceRules, AvoidanceSearch, Outcome
 from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.scene.balls import Balls, BallsSettings, aimed, capsules_of, velocity_to
@@ -23,6 +23,7 @@ from kumite.scene.stage import SceneObject
 from kumite.synthesis.cast import FASTEST
 
 AIM_SPREAD = 0.03  # m by which throws miss the middle of what they are aimed at
+TRUE = 0.10  # m from a body as it stands: a ball that passes no farther off was aimed well
 RECOIL = 0.01  # m that a struck segment gives way per m/s of the ball
 
 
@@ -136,6 +137,7 @@ class DodgeScene:
         self._by_hand = np.random.default_rng([self.seed, 2])
         self.balls = Balls(self.balls_settings, self.body, self.fps)
         self._number: dict[int, tuple[int, int]] = {}  # ball -> number of the throw, whom at
+        self._minded: set[int] = set()  # throws that would have met somebody
         self._capsules = self._pose()
 
     @property
@@ -215,6 +217,10 @@ class DodgeScene:
         attack = self.balls.attack[n]
         assert attack is not None
         self._number[n] = (number, at)
+        cast, spheres = self.cast, self.search.spheres
+        body = spheres.at(cast.position[at], cast.world_wxyz[at])
+        if attack.nearest(body, spheres.radius) < TRUE:
+            self._minded.add(number)
         self._event(
             "throw", at, attack=number, ball=self.balls.objects[n].name,
             speed=round(float(np.linalg.norm(velocity)), 3),
@@ -255,9 +261,11 @@ class DodgeScene:
         return True
 
     def _over(self, n: int) -> None:
-        """A ball has come down without having met anybody."""
+        """A ball has come down without having met anybody: avoided, if it would have met whom it
+        was thrown at or somebody has found a way out, else only missed."""
         number, at = self._number.pop(n)
-        self._event("avoided", at, attack=number)
+        self._event("avoided" if number in self._minded else "missed", at, attack=number)
+        self._minded.discard(number)
         self.dodgers.forget(number)
 
     def _throw_at_someone(
@@ -274,4 +282,6 @@ class DodgeScene:
         return capsules_of(self.body, self.cast.position, self.cast.world_wxyz)
 
     def _event(self, kind: str, k: int, **data) -> None:
+        if kind == "avoidance" and data["outcome"] == Outcome.FOUND:
+            self._minded.add(data["attack"])
         self.events.append(Event(self.frame, kind, self.names[k], data))

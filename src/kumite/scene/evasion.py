@@ -240,7 +240,7 @@ class EvasionScene:
         known.blow = blow
         cast, spheres = self.dodgers.cast, self.search.spheres
         body = spheres.at(cast.position[at], cast.world_wxyz[at])
-        known.gap = _nearest(blow.attack, body, spheres.radius)
+        known.gap = blow.attack.nearest(body, spheres.radius)
         self._event(
             "foreseen", self._dodgers_count + blow.who, attack=known.number,
             limb=LIMBS[blow.limb], blow=blow.blow, at=self.names[at], gap=round(known.gap, 4),
@@ -345,12 +345,6 @@ class EvasionScene:
 
     def _event(self, kind: str, k: int, **data) -> None:
         self.events.append(Event(self.frame, kind, self.names[k], data))
-
-
-def _nearest(attack: Attack, body: np.ndarray, radius: np.ndarray) -> float:
-    """The smallest gap [m] of an attack to spheres [B, 3] that stay where they are."""
-    off = attack.dense[-1][:, :, None] - body
-    return float((np.linalg.norm(off, axis=-1) - attack.radius[:, None] - radius).min())
 
 
 def _shared(skeletons: Sequence[Skeleton]) -> tuple[Skeleton, list[np.ndarray]]:

@@ -274,6 +274,16 @@ class SceneSettings(Settings):
                         f"{' with scatter' if bout.scatter else ''}, but bout.arena is "
                         f"{bout.arena:g} m; expected it to begin inside"
                     )
+            routes = [(f.name, f.route()) for f in self.fighters]
+            routes += [(c.who, c.route()) for c in self.cue]
+            for name, route in routes:
+                for n, point in enumerate(route.points if route else ()):
+                    far = hypot(*point.place)
+                    if far > bout.arena:
+                        raise ValueError(
+                            f"check point {n} of {name}: {far:g} m from the middle, but bout.arena "
+                            f"is {bout.arena:g} m; expected it inside"
+                        )
         twice = sorted(n for n, times in Counter(names).items() if times > 1)
         if twice:
             raise ValueError(f"names used twice: {', '.join(twice)}")

@@ -17,7 +17,9 @@ import numpy as np
 import viser
 
 from kumite.body import ROLES, BodyMesh, body_mesh
+from kumite.body.spheres import SWORD
 from kumite.clip import Skeleton
+from kumite.scene.stage import OUT_OF_SIGHT
 from kumite.studio.palette import RGB, mix, outfit
 from kumite.studio.ring import STAGE
 
@@ -155,9 +157,15 @@ class CrowdBodies:
     """One instanced rigid piece a joint and role, over all characters."""
 
     def __init__(
-        self, server: viser.ViserServer, skeleton: Skeleton, mesh: BodyMesh, count: int
+        self,
+        server: viser.ViserServer,
+        skeleton: Skeleton,
+        mesh: BodyMesh,
+        count: int,
+        unarmed: np.ndarray,
     ) -> None:
         weights = dense_weights(mesh, len(skeleton))
+        self._sword, self._unarmed = skeleton.roles.get(SWORD), unarmed
         rest = skeleton.rest_positions
         self._flashes = _Flashes(count)
         self._light = np.zeros(count)
@@ -192,7 +200,10 @@ class CrowdBodies:
             self._light[k] = 0.6 * light
         for handle, j, colours in self._pieces:
             handle.batched_wxyzs = wxyz[:, j].astype(np.float32)
-            handle.batched_positions = position[:, j].astype(np.float32)
+            place = position[:, j].astype(np.float32)
+            if j == self._sword:
+                place[self._unarmed] = OUT_OF_SIGHT
+            handle.batched_positions = place
             if lit:
                 white = np.array(STRUCK) - colours.astype(np.float64)
                 bright = colours + self._light[:, None] * white
@@ -208,10 +219,11 @@ def show_bodies(
 ) -> Bodies:
     """Bodies for everyone on the stage, in the way their number asks for.
 
-    unarmed: names of those whose sword is not to be seen; in a crowd it is.
+    unarmed: names of those whose sword is not to be seen.
     """
     if len(names) >= CROWD:
-        return CrowdBodies(server, skeleton, mesh, len(names))
+        bare_handed = np.array([name in unarmed for name in names])
+        return CrowdBodies(server, skeleton, mesh, len(names), bare_handed)
     bare = body_mesh(skeleton, armed=False) if unarmed else mesh
     own = {k: bare for k, name in enumerate(names) if name in unarmed}
     return SkinnedBodies(server, skeleton, mesh, len(names), own)

@@ -26,6 +26,7 @@ MARKS = {
     "throw": "○",
     "avoidance": "◌",
     "avoided": "↷",
+    "missed": "·",
     "struck": "●",
     "stale": "×",
     "launch": "▸",
@@ -105,7 +106,11 @@ def _thrown(data: Mapping[str, Any]) -> str:
 
 
 def _avoided(data: Mapping[str, Any]) -> str:
-    return f"ball {data.get('attack', '')} has met nobody"
+    return f"ball {data.get('attack', '')} is avoided"
+
+
+def _missed(data: Mapping[str, Any]) -> str:
+    return f"ball {data.get('attack', '')} comes near nobody"
 
 
 def _struck(data: Mapping[str, Any]) -> str:
@@ -141,6 +146,7 @@ DODGING = {
     "throw": _thrown,
     "avoidance": _searched,
     "avoided": _avoided,
+    "missed": _missed,
     "struck": _struck,
     "stale": _stale,
 }
