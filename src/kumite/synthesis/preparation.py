@@ -144,8 +144,8 @@ def weights(level: np.ndarray, curve: np.ndarray) -> np.ndarray:
 def checked_levels(level: np.ndarray | float) -> np.ndarray:
     """Levels of preparation as an array. Errors: one outside of 0 … 1."""
     out = np.asarray(level, dtype=np.float64)
-    wrong = out[~((out >= 0.0) & (out <= 1.0))]
-    if wrong.size:
+    if out.size and not (out.min() >= 0.0 and out.max() <= 1.0):  # NaN is neither
+        wrong = out[~((out >= 0.0) & (out <= 1.0))]
         raise KumiteError(f"preparation: a level of {wrong.flat[0]:g}; expected 0 to 1")
     return out
 
@@ -195,6 +195,8 @@ class Preparation:
         self.world_wxyz = np.zeros((count, joints, 4))
         self.facing = np.zeros((count, 3))  # of what is shown, in the scene
         self._straight = np.zeros((count, 3))
+        own = (self.root_position, self.wxyz, self.position, self.world_wxyz, self.facing)
+        self._shown = kernels.Prepared(*(array[None] for array in own))
         self.going = kernels.Going(
             np.zeros(count, dtype=bool),
             np.zeros((count, 3)),
@@ -252,7 +254,7 @@ class Preparation:
         stay. Errors: a level or a reference out of range; shapes that do not fit.
         """
         count = len(self.wxyz)
-        levels = np.broadcast_to(checked_levels(level), (count,))
+        levels = _each(checked_levels(level), count)
         like = _checked_references(reference, count, len(self.postures.wxyz))
         moves = kernels.Locomotion(
             _one(root_position, (count, 3)),
@@ -262,14 +264,7 @@ class Preparation:
             _one(on_ground, (count, 2), np.bool_),
             _one(self._straight if shift is None else shift, (count, 3)),
         )
-        shown = kernels.Prepared(
-            self.root_position[None],
-            self.wxyz[None],
-            self.position[None],
-            self.world_wxyz[None],
-            self.facing[None],
-        )
-        self._run(np.ascontiguousarray(levels)[None], like, moves, shown)
+        self._run(levels[None], like, moves, self._shown)
 
     def show_cast(
         self,
@@ -314,9 +309,16 @@ def _one(array: np.ndarray, shape: tuple[int, ...], dtype: type = np.float64) ->
     return a[None]
 
 
+def _each(array: np.ndarray, count: int) -> np.ndarray:
+    """One number for each of ``count``, at least one, as kernels take them."""
+    if array.shape != (count,):
+        array = np.broadcast_to(array, (count,))
+    return np.ascontiguousarray(array)
+
+
 def _checked_references(reference: np.ndarray | int, count: int, known: int) -> np.ndarray:
-    like = np.ascontiguousarray(np.broadcast_to(np.asarray(reference, dtype=np.int64), (count,)))
-    if np.any((like < 0) | (like >= known)):
+    like = _each(np.asarray(reference, dtype=np.int64), count)
+    if not (like.min() >= 0 and like.max() < known):
         raise KumiteError(f"preparation: reference {like.tolist()[:8]}; expected 0 … {known - 1}")
     return like
 
