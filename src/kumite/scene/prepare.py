@@ -16,31 +16,27 @@ from kumite.errors import KumiteError, unknown
 from kumite.graph import Library
 from kumite.graph.preparing import Preparing
 from kumite.kernels.blow import swept_contact
-from kumite.rotation import from_yaw, planar_apply, planar_inverse, rotate
+from kumite.rotation import rotate
 from kumite.scene.balls import capsules_of
 from kumite.scene.errands import PrepareSettings
 from kumite.scene.floor import TARGET_PARTS
 from kumite.scene.memory import refuse_too_many
+from kumite.scene.opponents import NOBODY, Opponents, closing_in
 from kumite.scene.recording import Event
 from kumite.scene.stage import SceneObject
 from kumite.scene.things import STRIKE, Things
 from kumite.scene.walkers import ARRIVED, NOTHING, ON_THE_WAY, Walkers
 from kumite.synthesis.preparation import curves
 
-NOBODY = NO_THING = -1
+NO_THING = -1
 ROOM = 0.5  # m between two pelvises under which people give way to each other
 APART = 1.0  # m, the same of two opponents
 GIVE_WAY = 0.4  # m/s at which they do
-REACH, RING = 0.6, 2.4  # m from a walker at which its opponent stops, and the others do
-SKIN = 0.13  # m from the middle of a trunk to where it is struck
 STRUCK_AROUND = 0.12  # s around its contact in which a blow may land
-RECOIL = 0.02  # m that a struck segment gives way per m/s of the blow
 NOTICED = 4.0  # m within which a thing ahead is prepared for by who is led by hand …
 AHEAD = np.radians(75)  # … so far to either side
 MARGIN = 0.5  # m: what is nearer than that is as likely as what is there
 CONVINCED, FORGETS = 12.0, 0.5  # 1/s, how fast a heading convinces, and how fast that is forgotten
-BEHIND = 1.5  # m that an opponent behind counts as farther away than one ahead
-WATCHED = 0.15  # s over which it is seen how opponents move
 PATIENCE = 5.0  # s without getting nearer to where the hand sent it, then it goes its own way
 
 
@@ -135,10 +131,7 @@ class PrepareScene:
         homes = [[*w.position, np.radians(w.yaw_deg)] for w in walking]
         if foes:
             middle = np.mean([w.position for w in walking], axis=0)
-            bearing = 2 * np.pi * (np.arange(foes.count) + self.rng.random()) / foes.count
-            for b in bearing.tolist():
-                at = middle + foes.distance * np.array([np.sin(b), np.cos(b)])
-                homes.append([*at, b + np.pi])
+            homes += closing_in(foes, middle, self.rng).tolist()
         self.walkers = Walkers(
             self.guide,
             np.array(homes),
@@ -148,15 +141,14 @@ class PrepareScene:
         )
         count = len(homes)
         self.thing = np.full(count, NO_THING)  # what each goes to
-        self.foe = np.full(count, NOBODY)  # or whom at
+        blows = tuple(self.motions.index(m) for m in foes.motions) if foes else ()
+        self.opponents = Opponents(foes, self.walkers, self.users, blows, self.rng)
         self.told = np.full((count, 2), np.nan)  # m: or where, by hand
         self._nearest = np.full(count, np.inf)  # m that it has come to there …
         self._nearer_at = np.zeros(count, dtype=np.int64)  # … in this frame
         # How likely each thing is what somebody who is led by hand makes for.
         self.belief = np.zeros((count, len(self.things)))
         self.turn = np.zeros(count, dtype=np.int64)  # how far each is in its course
-        self.flees = np.zeros(count, dtype=np.int64)  # frame until which an opponent keeps away
-        self.to_do = np.full(count, NOTHING)  # the motion to be done at a foe
         self._landed = np.zeros(count, dtype=bool)
         self._depth = np.full(count, -np.inf)  # m, deepest in the obstacle that it passes
         self._at = np.full(count, NO_THING)  # the thing that a target motion is done at
@@ -165,7 +157,6 @@ class PrepareScene:
         self._course = [
             [self.things.names.index(n) for n in w.goes_to] for w in self.settings.walking
         ]
-        self._path = np.tile(self.walkers.facing[:, :2], (max(2, round(WATCHED * self.fps)), 1, 1))
 
     @property
     def cast(self):
@@ -238,11 +229,10 @@ class PrepareScene:
 
     def step(self) -> bool:
         w = self.walkers
-        self._path = np.concatenate([self._path[1:], w.facing[None, :, :2]])
         self._assign()
         self._aim()
         for k in w.ready().tolist():
-            if self.automatic and k < self.users and (self.thing[k] >= 0 or self.foe[k] >= 0):
+            if self.automatic and k < self.users and self._aimed(k):
                 self._launch(k, int(w.wants[k]), bend=True)
         self._keep_apart()
         w.advance()
@@ -256,8 +246,7 @@ class PrepareScene:
         w, things = self.walkers, self.things
         if self.automatic or self.settings.opponents:
             self._hand_back()
-        if self.settings.opponents:
-            self._assign_foes()
+        self.opponents.assign(self.frame)
         if not self.automatic or len(things) == 0:
             return
         free = (self.thing[: self.users] == NO_THING) & np.isnan(self.told[: self.users, 0])
@@ -283,30 +272,6 @@ class PrepareScene:
         for k in led[(away < ARRIVED) | stuck].tolist():
             self.let_go(k)
 
-    def _assign_foes(self) -> None:
-        """Walkers turn to the nearest opponent that does not keep away, opponents to walkers."""
-        w, foes = self.walkers, np.arange(self.users, len(self.names))
-        come = foes[self.flees[foes] <= self.frame]
-        for k in range(self.users):
-            if w.doing[k] != ON_THE_WAY:
-                continue
-            near = NOBODY
-            if len(come):
-                away, aside = seen(np.tile(w.facing[k], (len(come), 1)), w.facing[come, :2])
-                away += BEHIND * np.abs(aside) / np.pi
-                if self.foe[k] in come:  # nobody turns to and fro between two who are equally near
-                    away[come == self.foe[k]] -= 0.5
-                near = int(come[np.argmin(away)])
-            if near != self.foe[k]:
-                self.foe[k] = near
-                if near != NOBODY and self.to_do[k] == NOTHING:
-                    self._choose_blow(k)
-                w.decide_anew(np.array([k]))
-
-    def _choose_blow(self, k: int) -> None:
-        labels = self.settings.opponents.motions
-        self.to_do[k] = self.motions.index(labels[int(self.rng.integers(len(labels)))])
-
     def _aim(self) -> None:
         """Goals, sources of influence and what is prepared for, of all."""
         w = self.walkers
@@ -315,13 +280,13 @@ class PrepareScene:
         has = np.isfinite(place[:, 0])
         wants = np.full(len(has), NOTHING)
         wants[self.thing >= 0] = self.things.motion[self.thing[self.thing >= 0]]
-        wants = np.where(self.foe != NOBODY, self.to_do, wants)
+        wants = np.where(self.opponents.foe != NOBODY, self.opponents.to_do, wants)
         w.heeds[:] = has & np.isnan(self.told[:, 0])
         busy = np.flatnonzero((w.doing != ON_THE_WAY) & (self._whom != NOBODY))
         for k in busy.tolist():
             left = (self.preparing.contact[w.doing[k]] - w.cast.frame[k]) / self.fps
             if left > 0:
-                w.aim(k, self._foe_place(k, int(self._whom[k]), int(w.doing[k]), left))
+                w.aim(k, self.opponents.place(k, int(self._whom[k]), int(w.doing[k]), left))
         who = np.flatnonzero(has)
         if len(who):
             w.goal[who] = w.stance(wants[who], place[who], w.facing[who], normal[who])
@@ -336,7 +301,7 @@ class PrepareScene:
                 w.goal[k] = [*w.facing[k, :2], np.nan]
                 wants[k] = self._notice(k)
         for k in rest[rest >= self.users].tolist():
-            w.goal[k] = self._closing_in(k)
+            w.goal[k] = self.opponents.goal(k, self.frame)
         changed = np.flatnonzero(wants != w.wants)
         w.wants[:] = wants
         w.decide_anew(changed)
@@ -349,9 +314,9 @@ class PrepareScene:
         as far as each is likely (what section 8 of the paper asks for).
         """
         w, things = self.walkers, self.things
-        if self.foe[k] != NOBODY:
-            w.source[k] = w.facing[self.foe[k], :2]
-            return int(self.to_do[k])
+        if self.opponents.foe[k] != NOBODY:
+            w.source[k] = w.facing[self.opponents.foe[k], :2]
+            return int(self.opponents.to_do[k])
         if len(things) == 0:
             return NOTHING
         here = np.tile(w.facing[k], (len(things), 1))
@@ -381,36 +346,15 @@ class PrepareScene:
         if len(at):
             k = who[at]
             place[at], normal[at] = self.things.gates(w.facing[k], self.thing[k])
-        for n in np.flatnonzero(self.foe[who] != NOBODY).tolist():
+        for n in np.flatnonzero(self.opponents.foe[who] != NOBODY).tolist():
             k = int(who[n])
-            t = int(self.to_do[k])
+            t = int(self.opponents.to_do[k])
             seconds = float(w.seconds_to_contact(np.array([t]))[0])
-            place[n] = self._foe_place(k, int(self.foe[k]), t, seconds)
+            place[n] = self.opponents.place(k, int(self.opponents.foe[k]), t, seconds)
         return place, normal
 
-    def _foe_place(self, k: int, foe: int, t: int, seconds: float) -> np.ndarray:
-        """Where opponent ``foe`` [3] is to be struck in so many seconds, if it goes on as now."""
-        w = self.walkers
-        moves = (self._path[-1, foe] - self._path[0, foe]) / ((len(self._path) - 1) / self.fps)
-        at = w.shown.root_position[foe, [0, 2]] + seconds * moves
-        way = w.facing[k, :2] - at
-        at = at + SKIN * way / max(float(np.hypot(*way)), 1e-9)
-        return np.array([at[0], self.preparing.place[t, 1], at[1]])
-
-    def _closing_in(self, k: int) -> np.ndarray:
-        """Where [3] an opponent goes: up to the nearest walker, or away from it for a while."""
-        w = self.walkers
-        away = np.hypot(*(w.facing[: self.users, :2] - w.facing[k, :2]).T)
-        at = w.facing[int(np.argmin(away)), :2]
-        out = w.facing[k, :2] - at
-        out /= max(float(np.hypot(*out)), 1e-9)
-        far = REACH if k in self.foe[: self.users] else RING
-        far = self.settings.opponents.distance if self.flees[k] > self.frame else far
-        goal = at + far * out
-        return np.array([*goal, np.nan])
-
     def _aimed(self, k: int) -> bool:
-        return bool(self.thing[k] >= 0 or self.foe[k] != NOBODY)
+        return bool(self.thing[k] >= 0 or self.opponents.foe[k] != NOBODY)
 
     def _launch(self, k: int, t: int, *, bend: bool) -> None:
         place, normal = self._objects_of(np.array([k]))
@@ -418,7 +362,7 @@ class PrepareScene:
         self.walkers.launch(k, t, place[0] if meets else None, float(normal[0]))
         self._landed[k], self._depth[k] = False, -np.inf
         self._at[k] = self.thing[k] if meets else self._nearest_thing(k, t)
-        self._whom[k] = self.foe[k]
+        self._whom[k] = self.opponents.foe[k]
         limb = int(self.preparing.limb[t])
         if limb >= 0:
             self._event("strike", k, limb=LIMBS[limb], blow=t)
@@ -474,7 +418,7 @@ class PrepareScene:
             # What it was sent to by hand is not its turn.
             self.turn[k] += bool(course and self.thing[k] == course[self.turn[k] % len(course)])
             self.thing[k] = NO_THING
-        self.to_do[k], self.foe[k] = NOTHING, NOBODY
+        self.opponents.forget(k)
 
     def _finish(self, k: int) -> None:
         n = int(self._at[k])
@@ -537,7 +481,8 @@ class PrepareScene:
             if best[0] <= 1.0:
                 when, part = best
                 self._hit(k, limb, self.names[foe], body.parts[part], velocity, p0, p1, when)
-                self._reel(foe, part, p0 + when * (p1 - p0), velocity)
+                joint, place = int(self.body.joint[part]), p0 + when * (p1 - p0)
+                self.opponents.reel(foe, joint, place, velocity, self.frame)
 
     def _hit(self, k, limb, victim, part, velocity, p0, p1, when) -> None:
         self._landed[k] = True
@@ -552,15 +497,6 @@ class PrepareScene:
             place=[round(float(x), 4) for x in place],
             time=round((self.frame - 1 + when) / self.fps, 4),
         )
-
-    def _reel(self, foe: int, part: int, place: np.ndarray, velocity: np.ndarray) -> None:
-        """A struck opponent gives way, and keeps away for a while."""
-        w = self.walkers
-        back = planar_inverse(w.shown.lag[foe])
-        way = rotate(from_yaw(back[2]), RECOIL * velocity)
-        w.cast.strike(foe, int(self.body.joint[part]), planar_apply(back, place), way)
-        self.flees[foe] = self.frame + round(self.settings.opponents.rest * self.fps)
-        w.decide_anew(np.array([foe]))
 
     def _event(self, kind: str, k: int, **data) -> None:
         self.events.append(Event(self.frame, kind, self.names[int(k)], data))

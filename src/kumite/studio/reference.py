@@ -105,7 +105,7 @@ class Prepared:
     def _goes(self) -> bool:
         scene, k = self.scene, self.asked.who
         led = np.isfinite(scene.told[k, 0])
-        return bool(led or scene.thing[k] != NO_THING or scene.foe[k] != NOBODY)
+        return bool(led or scene.thing[k] != NO_THING or scene.opponents.foe[k] != NOBODY)
 
     def state(self) -> State:
         """Under the lock: how things stand."""
