@@ -20,7 +20,8 @@ from kumite.body import BodyMesh, skin_vertices
 from kumite.rotation import from_yaw, planar_apply, planar_inverse
 from kumite.scene import PrepareScene
 from kumite.scene.look import line
-from kumite.scene.prepare import NO_THING, NOBODY
+from kumite.scene.opponents import NOBODY
+from kumite.scene.prepare import NO_THING
 from kumite.scene.walkers import NOTHING, ON_THE_WAY
 from kumite.studio.palette import RGB, corner, mix
 from kumite.studio.ring import STAGE

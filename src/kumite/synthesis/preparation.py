@@ -347,8 +347,8 @@ def prepare_clip(
     position, _ = forward_kinematics(skeleton, clip.root_position, clip.wxyz)
     facing = facing_frame(skeleton, clip.root_position, clip.wxyz)
     ankle = np.ascontiguousarray(position[:, work.build.legs[:, 2]])
-    parts = (clip.root_position, clip.wxyz, facing, ankle, on_ground)
-    moves = kernels.Locomotion(*(a[:, None] for a in parts), np.zeros((frames, 1, 3)))
+    parts = (clip.root_position, clip.wxyz, facing, ankle, on_ground, np.zeros((frames, 3)))
+    moves = kernels.Locomotion(*(a[:, None] for a in parts))
     joints = len(skeleton)
     shapes = [(3,), (joints, 4), (joints, 3), (joints, 4), (3,)]
     shown = kernels.Prepared(*(np.zeros((frames, 1, *shape)) for shape in shapes))
