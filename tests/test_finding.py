@@ -87,7 +87,7 @@ def test_the_performers_targets_are_found(made):
         if over[t] > 0.5 * (stop - start):
             hit += 1
             matched.append(t)
-            assert abs(found.mark[t] - mark) < 0.6 * clips.fps
+            assert abs(found.mark[t] - mark) < 0.7 * clips.fps
     # The others are no targets of a capture, but neither are they many.
     assert hit >= 0.85 * len(truth) and len(found) - len(set(matched)) <= 0.1 * len(truth)
 
@@ -218,7 +218,7 @@ def test_build_finds_targets_by_itself(run, files: Path, tmp_path: Path):
 def test_build_takes_marks_from_a_file(run, files: Path, tmp_path: Path):
     (tmp_path / "a.txt").write_text(
         row("duck_under", 509, 654, "duck", "mark=536")
-        + row("jump_over", 560, 600, "jump", "mark=598")
+        + row("jump_over", 570, 640, "jump", "mark=598")
     )
     build = ("build", files, "-o", "p.kumite", "--level", "preparation", "--actions", "a.txt")
     code, text, err = run(*build, "--alike", 1.0, "--threshold", 1e-9)

@@ -311,7 +311,7 @@ def measure_one(k, position, world_wxyz, shapes, blows):
 def throw_one(k, blow_of_frame, f, blows):
     """Note which blows character k throws at frame f; a limb that rests may throw them again.
 
-    Returns how many have begun and whether any may land.
+    Returns how many have begun; whether any may land is noted, too.
     """
     begun, flying = 0, False
     for s in range(4):
@@ -323,7 +323,8 @@ def throw_one(k, blow_of_frame, f, blows):
             blows.landed[k, s] = NO_BLOW
         begun += blows.begun[k, s]
         flying = flying or blow != blows.landed[k, s]
-    return begun, flying
+    blows.flying[k] = flying
+    return begun
 
 
 @kernel
@@ -383,7 +384,7 @@ def start_blows(played, grid, shapes, blows):
         throw_one(k, played.blow_of_frame, played.frame[k], blows)
 
 
-def _advance(dt, own, springs, capture, build, offsets, poses, grid, opponent, room, shapes, blows):
+def _advance(dt, own, springs, capture, build, offsets, poses, grid, room, shapes, blows):
     frame, place = own.frame, poses.root_position
     for k in prange(frame.shape[0]):
         move_on(k, frame, own.fraction, own.rate, own.pace)
@@ -396,16 +397,21 @@ def _advance(dt, own, springs, capture, build, offsets, poses, grid, opponent, r
     count = 0
     for k in prange(frame.shape[0]):
         measure_one(k, poses.position, poses.world_wxyz, shapes, blows)
-        begun, blows.flying[k] = throw_one(k, own.blow_of_frame, frame[k], blows)
-        count += begun
-    for k in prange(frame.shape[0]):
+        count += throw_one(k, own.blow_of_frame, frame[k], blows)
+    return count
+
+
+def _hit(opponent, shapes, blows):
+    # Apart from the loop above: put into one, blows would be tested on bodies not yet measured.
+    count = 0
+    for k in prange(opponent.shape[0]):
         if blows.flying[k]:
             count += hit_one(k, opponent[k], shapes, blows)
     return count
 
 
-_advance_few = kernel(_advance)
-_advance_many = parallel_kernel(_advance)
+_advance_few, _advance_many = kernel(_advance), parallel_kernel(_advance)
+_hit_few, _hit_many = kernel(_hit), parallel_kernel(_hit)
 
 
 @kernel
@@ -418,7 +424,7 @@ def advance(dt, played, grid, opponent, room, shapes, blows):
     """
     p = played
     own, offsets = own_of(p), p.offsets
-    return _advance_few(
+    begun = _advance_few(
         dt,
         own,
         p.springs,
@@ -427,11 +433,11 @@ def advance(dt, played, grid, opponent, room, shapes, blows):
         offsets,
         p.poses,
         grid,
-        opponent,
         room,
         shapes,
         blows,
     )
+    return begun + _hit_few(opponent, shapes, blows)
 
 
 @kernel
@@ -439,7 +445,7 @@ def advance_many(dt, played, grid, opponent, room, shapes, blows):
     """:func:`advance` on all cores."""
     p = played  # a loop on all cores is handed tuples of arrays, but none that hold others
     own, offsets = own_of(p), p.offsets
-    return _advance_many(
+    begun = _advance_many(
         dt,
         own,
         p.springs,
@@ -448,11 +454,11 @@ def advance_many(dt, played, grid, opponent, room, shapes, blows):
         offsets,
         p.poses,
         grid,
-        opponent,
         room,
         shapes,
         blows,
     )
+    return begun + _hit_many(opponent, shapes, blows)
 
 
 def _step(

@@ -288,6 +288,11 @@ class Walkers:
         self._lead()
         self.shown.show_cast(cast, self.alpha, np.arange(cast.count), shift)
 
+    @property
+    def _plays(self) -> np.ndarray:
+        """The cores [K] that are played, or NOTHING."""
+        return np.where(self._stretch >= 0, self.preparing.what[self._stretch], NOTHING)
+
     def _steer(
         self,
         by: np.ndarray,
@@ -306,6 +311,7 @@ class Walkers:
         turn = self.guide.turn(self.row, by, near, alpha)
         shift[:, 2] = np.where(goes & ~self.stands, turn / self.fps, 0.0)
         sharp = np.clip((np.abs(by) - SHARP[0]) / (SHARP[1] - SHARP[0]), 0.0, 1.0)
+        goes &= self._plays != self._stand  # nobody is held back who stands
         wanted = np.where(goes, ON_THE_SPOT * np.maximum(sharp, there), 0.0)
         most = SLOWS / self.fps
         self._slow += np.clip(wanted - self._slow, -most, most)
@@ -318,7 +324,7 @@ class Walkers:
     def _choose(self, who: np.ndarray) -> None:
         """Those at the end of what they play take what comes next."""
         cast, guide, table = self.cast, self.guide, self.library.table
-        plays = np.where(self._stretch >= 0, self.preparing.what[self._stretch], NOTHING)
+        plays = self._plays
         # Who stands does not wait for the end of a cycle: all its poses are much alike.
         bored = self._heed_now & (plays == self._stand)
         who = np.union1d(who, np.flatnonzero(bored))
