@@ -32,7 +32,7 @@ from kumite.scene.metrics import foot_skate, source_skate
 from kumite.scene.settings import SceneSettings
 from kumite.scene.walkers import ON_THE_WAY, headless
 
-SEED = 200
+SEED = 300
 RUNS = 100  # approaches of each target motion
 FIELD = 40.0  # m from one to the next: nobody is in another's way
 NEAREST, FARTHEST = 3.0, 7.0  # m from what there is to do

@@ -66,6 +66,19 @@ def test_every_core_that_moves_is_steered(library: Library):
             assert approach.motions.follows[r, c] == links[a, b]
 
 
+def test_gaits_say_which_cores_are_taken(library: Library):
+    cores = prepared(library).hierarchy.cores
+    for gaits in (["walk"], ["run"], ["run", "walk"]):
+        approach = approach_motions(library, gaits=gaits)
+        assert {cores.label[c] for c in approach.core.tolist()} == set(gaits)
+        assert len(approach.core) == 5 * len(gaits)  # each with every steer
+    slow, fast = (approach_motions(library, steer=(0.0,), gaits=[g]) for g in ("walk", "run"))
+    slow, fast = (
+        np.hypot(*a.motions.displacement[0, 0, :2]) / a.motions.duration[0] for a in (slow, fast)
+    )
+    assert fast > 1.5 * slow  # m/s
+
+
 def test_a_steered_walk_is_the_walk_turned_frame_by_frame(library: Library):
     approach = approach_motions(library, steer=(0.0, 0.6))
     cores, clips = prepared(library).hierarchy.cores, library.clips

@@ -23,6 +23,7 @@ from kumite.synthesis import (
     Cast,
     LevelFilter,
     Preparation,
+    References,
     curves,
     level_displacements,
     prepare_clip,
@@ -30,7 +31,7 @@ from kumite.synthesis import (
     repeat_cycle,
     smooth_levels,
 )
-from kumite.synthesis.preparation import weights
+from kumite.synthesis.preparation import blended, weights
 
 
 class Walker:
@@ -210,17 +211,127 @@ def test_a_level_that_changes_moves_without_jumps(walker: Walker):
     assert slide.mean() < 0.01 and slide.max() < 0.12
 
 
+# Postures in between -----------------------------------------------------------------------------
+
+
+def test_all_of_one_posture_is_that_posture(walker: Walker):
+    some = walker.postures
+    mixed = blended(some, np.array([[0.0, 3.0], [0.25, 0.0], [0.0, 1.0]]))
+    for n, r in enumerate((1, 0, 1)):
+        # Unit quaternions are normalised again, which may turn a last bit.
+        np.testing.assert_allclose(mixed.wxyz[n], some.wxyz[r], rtol=0, atol=1e-15)
+        assert mixed.root[n].tobytes() == some.root[r].tobytes()
+        assert mixed.ankle[n].tobytes() == some.ankle[r].tobytes()
+
+
+def test_half_of_two_postures_is_the_middle_of_the_arc(walker: Walker):
+    some = walker.postures
+    turned = some.wxyz.copy()
+    turned[1, ::2] *= -1.0  # the same rotations, written with the other sign
+    for wxyz in (some.wxyz, turned):
+        mixed = blended(References(wxyz, some.root, some.ankle), np.array([[0.5, 0.5]]))
+        for j in range(wxyz.shape[1]):
+            arc = Slerp([0, 1], Rotation.from_quat(some.wxyz[:, j], scalar_first=True))
+            theirs = Rotation.from_quat(mixed.wxyz[0, j], scalar_first=True).inv() * arc(0.5)
+            assert theirs.magnitude() < 1e-7, j
+        np.testing.assert_allclose(mixed.root[0], some.root.mean(axis=0), atol=1e-15)
+        np.testing.assert_allclose(mixed.ankle[0], some.ankle.mean(axis=0), atol=1e-15)
+    assert angle(some.wxyz[0], some.wxyz[1]).max() > 0.5  # rad: there is something in between
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [[[1.0]], [[0.0, 0.0]], [[1.0, -0.1]], [[np.nan, 1.0]], [1.0, 0.0], [[1.0, 0.0, 0.0]]],
+    ids=str,
+)
+def test_weights_that_mix_nothing(walker: Walker, wrong):
+    with pytest.raises(KumiteError, match="expected 2 in each row, none below 0, not all 0"):
+        blended(walker.postures, np.array(wrong))
+
+
+def test_postures_are_led_to_others_by_shares(walker: Walker):
+    some = walker.postures
+    count = np.zeros(3, dtype=np.int64)
+    mine = References(some.wxyz[count], some.root[count], some.ankle[count])
+    work = Preparation(walker.clip.skeleton, 60.0, mine, 3)
+    rows, which = np.array([0, 2]), np.array([1, 1])
+    left = work.lead(rows, some, which, np.array([1.0, 0.5]))
+    assert left[0] < 1e-15 and left[1] > 0.01
+    now = work.postures
+    same = angle(now.wxyz[0], some.wxyz[1])
+    assert same.max() < 1e-7
+    np.testing.assert_allclose(now.root[0], some.root[1], atol=1e-15)
+    np.testing.assert_allclose(now.ankle[0], some.ankle[1], atol=1e-15)
+    np.testing.assert_array_equal(now.wxyz[1], some.wxyz[0])  # who is not led keeps his
+    # Half and half again leaves a quarter, of rotations as nearly as a chord is its arc.
+    again = work.lead(rows[1:], some, which[1:], 0.5)
+    np.testing.assert_allclose(
+        now.root[2] - some.root[1], 0.25 * (some.root[0] - some.root[1]), atol=1e-15
+    )
+    np.testing.assert_allclose(
+        now.ankle[2] - some.ankle[1], 0.25 * (some.ankle[0] - some.ankle[1]), atol=1e-15
+    )
+    whole, rest = angle(some.wxyz[0], some.wxyz[1]), angle(now.wxyz[2], some.wxyz[1])
+    turned = whole > 1e-3
+    np.testing.assert_allclose(rest[turned] / whole[turned], 0.25, atol=0.02)
+    assert again[0] < 0.6 * left[1]
+    np.testing.assert_allclose(np.linalg.norm(now.wxyz, axis=-1), 1.0, atol=1e-12)
+
+
+# What they go and turn besides -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("level", [0.0, 0.5])
+def test_a_steady_turn_is_a_circle_and_feet_stay(walker: Walker, level: float):
+    """On a walk that goes straight, turned by 40° a second."""
+    rate, frames = np.radians(40.0), len(walker.clip)
+    skeleton, clip = walker.clip.skeleton, walker.clip
+    work = Preparation(skeleton, 60.0, walker.postures, 1)
+    feet = [skeleton.joint(f"{side}_foot") for side in SIDES]
+    shift = np.array([[0.0, 0.0, rate / 60.0]])
+    at, ankles = [], []
+    for f in range(frames):
+        stepped(walker, work, f, 1, level, shift=shift)
+        at.append(work.facing[0].copy())
+        ankles.append(work.position[0, feet][:, [0, 2]].copy())
+    at, ankles = np.array(at), np.array(ankles)
+    # Speed over rate of turning; the walk itself sways by 5 cm.
+    facing = facing_frame(skeleton, clip.root_position, clip.wxyz)
+    way = (1.0 - level) * np.hypot(*np.diff(facing[[0, -1], :2], axis=0)[0])
+    radius = way / ((frames - 1) / 60.0) / rate
+    flat = np.column_stack([2.0 * at[:, :2], np.ones(frames)])
+    x, z, c = np.linalg.lstsq(flat, np.sum(at[:, :2] ** 2, axis=1), rcond=None)[0]
+    assert np.sqrt(c + x * x + z * z) == pytest.approx(radius, rel=0.02)
+    off = np.hypot(at[:, 0] - x, at[:, 1] - z)
+    assert np.abs(off - radius).max() < 0.06
+    went = np.unwrap(at[:, 2])
+    assert went[-1] - went[0] == pytest.approx(rate * (frames - 1) / 60.0, abs=0.01)
+    # A foot that stands goes as far as the walk's own does (its heel is raised), and no farther.
+    own = joints_of(clip)[:, feet][..., [0, 2]]
+    for f in range(2):
+        held = walker.ground[1:, f] & walker.ground[:-1, f]
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], held.astype(int), [0]])))
+        for start, stop in edges.reshape(-1, 2).tolist():
+            goes, may = (
+                float(np.hypot(*np.diff(x[start : stop + 1, f], axis=0).T).sum())
+                for x in (ankles, own)
+            )
+            assert goes < (1.0 - level) * may + 1e-3, (f, start)
+
+
 # Many at once -------------------------------------------------------------------------------------
 
 
-def stepped(walker: Walker, work: Preparation, f: int, count: int, level, reference: Any = 0):
+def stepped(
+    walker: Walker, work: Preparation, f: int, count: int, level, reference: Any = 0, shift=None
+):
     clip = walker.clip
     position = joints_of(clip)[f]
     facing = facing_frame(clip.skeleton, clip.root_position, clip.wxyz)[f]
     feet = [clip.skeleton.joint(f"{side}_foot") for side in SIDES]
     parts = (clip.root_position[f], clip.wxyz[f], facing, position[feet], walker.ground[f])
     a, b, c, d, e = (np.repeat(x[None], count, axis=0) for x in parts)
-    work.show(a, b, c, d, e, level, reference)
+    work.show(a, b, c, d, e, level, reference, shift)
 
 
 def test_many_characters_are_each_as_one(walker: Walker):

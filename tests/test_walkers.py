@@ -9,16 +9,20 @@ import numpy as np
 import pytest
 
 from kumite.clip import LIMBS, forward_kinematics
+from kumite.control import approach_motions, gradual
 from kumite.control.guide import Guide, learned_guide
 from kumite.graph import Library, builtin_library
 from kumite.graph.hierarchy import ways_into_cores
 from kumite.graph.preparing import KINDS
-from kumite.rotation import planar_apply, planar_compose, planar_inverse, rotate, wrap_angle
+from kumite.rotation import angle, planar_apply, planar_compose, planar_inverse, rotate, wrap_angle
+from kumite.scene import PrepareScene
 from kumite.scene.errands import TargetSettings
+from kumite.scene.settings import SceneSettings
 from kumite.scene.things import MASS_RATIO, Things
 from kumite.scene.walkers import OFF, Walkers
 
 STRIKE = KINDS.index("strike")
+QUICK = gradual(places=16, batch=1)
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +119,7 @@ def test_blows_are_bent_as_far_as_allowed(targets: Library, guide: Guide, off: f
             assert left > 0.5 * off  # it is left as captured
         else:
             # Bent by 30 cm, a foot that leaves the ground late is still on its way.
-            assert left < (0.02 if off <= 0.1 else 0.03), p.hierarchy.targets.label[t]
+            assert left < (0.01 if off <= 0.1 else 0.03), p.hierarchy.targets.label[t]
 
 
 def clips_facing(library: Library, w: Walkers, t: int) -> np.ndarray:
@@ -127,12 +131,16 @@ def test_who_does_nothing_shows_its_cast(guide: Guide):
     homes = np.array([[0.0, 0.0, 0.0], [3.0, -2.0, 1.2]])
     w = some_walkers(guide, homes, "none")
     w.goal[:], w.heeds[:] = homes, False
+    skeleton = guide.library.clips.skeleton
+    upper = slice(1, skeleton.joint("left_thigh"))
     for _ in range(90):
         w.advance()
         assert np.all(w.alpha == 0.0)
-        np.testing.assert_array_equal(w.shown.wxyz[:, 1:], w.cast.wxyz[:, 1:])
-        np.testing.assert_allclose(w.shown.root_position, w.cast.root_position, atol=1e-12)
-        np.testing.assert_allclose(w.shown.position, w.cast.position, atol=1e-12)
+        # Who stands does not drift with what was captured: his legs alone make up for it.
+        np.testing.assert_array_equal(w.shown.wxyz[:, upper], w.cast.wxyz[:, upper])
+        assert angle(w.shown.wxyz, w.cast.wxyz).max() < 0.1
+        np.testing.assert_allclose(w.shown.root_position, w.cast.root_position, atol=0.02)
+        assert np.hypot(*(w.facing - homes)[:, :2].T).max() < 0.02
 
 
 def test_ways_into_cores_are_the_shortest(targets: Library):
@@ -274,3 +282,36 @@ def test_settled_policies_are_kept(targets: Library, tmp_path: Path):
     assert len(first.policies) == 2 and kept == sorted(p.name for p in tmp_path.iterdir())
     for a, b in zip(first.policies, again.policies):
         np.testing.assert_array_equal(a.best, b.best)
+
+
+def test_targets_with_the_same_curve_share_a_policy(targets: Library, tmp_path: Path):
+    """Section 6: what a controller has to know of a target is the C of its root."""
+    walker = {"name": "anna", "position": (0.0, 0.0)}
+
+    def scene_of(folder: str, **prepare) -> PrepareScene:
+        new = {"title": "t", "about": "a", "walker": [walker], "prepare": prepare}
+        settings = SceneSettings.model_validate(new)
+        return PrepareScene(settings, targets, cache=tmp_path / folder, learning=QUICK)
+
+    def kept(folder: str) -> int:
+        return len(list((tmp_path / folder).iterdir()))
+
+    labels = list(targets.preparing.hierarchy.targets.label)  # type: ignore[union-attr]
+    root = targets.clips.skeleton.names[0]
+    one = scene_of("one", curves={"punch": {"head": 0.25}, "duck_under": {"upper": 2.0}})
+    assert len(one.guide.policies) == 1 and kept("one") == 1
+    assert set(one.guide.policy_of.tolist()) == {0}
+    two = scene_of("two", curves={"punch": {root: 0.5}, "kick_ball": {root: 0.5}})
+    assert len(two.guide.policies) == 2 and kept("two") == 2
+    which = dict(zip(labels, two.guide.policy_of.tolist()))
+    assert which["punch"] == which["kick_ball"] != which["jump_over"] == which["duck_under"]
+    # Each is learned from ways that get shorter by its own C: where the C is the usual one, it is
+    # the policy that all share otherwise.
+    np.testing.assert_array_equal(
+        two.guide.policies[which["jump_over"]].best, one.guide.policies[0].best
+    )
+    a, b = (
+        approach_motions(targets, QUICK, gaits=["walk"], curve=c).motions.displacement
+        for c in (1.0, 0.5)
+    )
+    assert np.hypot(*b[0, 2, :2]) < 0.8 * np.hypot(*a[0, 2, :2])

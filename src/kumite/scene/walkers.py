@@ -31,11 +31,14 @@ ON_THE_WAY = -1  # what somebody does who does no target motion
 NOTHING = -1  # what somebody prepares for who prepares for nothing
 
 CLOSE = 0.10  # m from its place: near enough for the motion that is done there
+SQUARE = np.radians(12)  # off its heading: so too
 OFF, ASKEW = 0.35, np.radians(30)  # m and rad that a target motion may be bent to fit, at most
-PATIENCE, LONGEST_PATIENCE = 0.4, 1.5  # s without getting nearer, prepared or not: it must do
+PATIENCE, LONGEST_PATIENCE = 0.4, 1.5  # s without getting nearer, prepared or not yet: it must do
+NO_PATIENCE = 0.05  # s, of who does not prepare: it is past its place
 SHARP = np.radians([35, 90])  # angles between which a turn gets sharp
 ON_THE_SPOT = 0.85  # of the way that is not gone in a sharp turn …
 SLOWS = 2.5  # … and how fast that share changes, 1/s
+STARTS_TURNING = 15.0  # rad/s², how fast a turn begins and ends
 NEAR = 0.6  # m within which it may turn freely
 AWRY = np.radians(60)  # off its heading: as bad as a cell off its place
 ARRIVED = 0.8  # m from a place where nothing is to be done: there a walk is ended
@@ -107,6 +110,7 @@ class Walkers:
         self.row = np.zeros(count, dtype=np.int64)  # the motion chosen, of the approach
         self.stands = np.ones(count, dtype=bool)  # or rather stays where it is
         self._slow = np.zeros(count)  # share of the way that is not gone, in sharp turns
+        self._turn = np.zeros(count)  # rad/s, besides what the locomotion turns
         states, links = library.table.state_frame, preparing.hierarchy
         out = np.searchsorted(states, links.link_leave[self._stand])
         self._leave_stand = np.where(links.links[self._stand], out, NOTHING)
@@ -183,14 +187,16 @@ class Walkers:
         """Who [N] is where its target motion may begin, or as near to it as it comes."""
         way = (self.doing == ON_THE_WAY) & (self.wants != NOTHING) & self.heeds
         off, askew = self.off()
-        nearer = off < self._nearest - 0.01
-        self._nearest = np.where(nearer, off, self._nearest)
+        miss = off + NEAR * askew / AWRY  # who turns gets nearer
+        nearer = miss < self._nearest - 0.01
+        self._nearest = np.where(nearer, miss, self._nearest)
         self._waited = np.where(nearer, 0, self._waited + 1)
         fits = (off <= OFF) & (askew <= ASKEW)
         prepared = self.alpha >= READY if self.prepares else np.ones(len(off), dtype=bool)
-        patience = np.where(self.alpha >= READY, PATIENCE, LONGEST_PATIENCE) * self.fps
-        late = self._waited >= (patience if self.prepares else 1)
-        return np.flatnonzero(way & fits & ((prepared & (off <= CLOSE)) | late))
+        patience = np.where(self.alpha >= READY, PATIENCE, LONGEST_PATIENCE)
+        late = self._waited >= (patience if self.prepares else NO_PATIENCE) * self.fps
+        there = (off <= CLOSE) & (askew <= SQUARE)
+        return np.flatnonzero(way & fits & ((prepared & there) | late))
 
     def off(self) -> tuple[np.ndarray, np.ndarray]:
         """How far all are from their places [K] m, and from their headings [K] rad."""
@@ -266,6 +272,8 @@ class Walkers:
         smooth = self.filter.push(np.where(busy, 0.0, self.level))
         off, _ = self.off()
         bearing = seen(self.facing, steered_for(self.facing, self.goal))[1]
+        behind = np.abs(seen(self.facing, self.goal[:, :2])[1]) > 0.5 * np.pi
+        past = behind & (off < OFF)
         was, self.alpha = self.alpha, np.where(busy, 0.0, smooth)
         askew = np.nan_to_num(wrap_angle(self.goal[:, 2] - self.facing[:, 2]))
         if self.prepares:
@@ -273,14 +281,27 @@ class Walkers:
             wrong = NEAR * np.abs(askew) / AWRY
             before = (np.abs(bearing) < 0.5 * np.pi) | (off < OFF)  # its place, or at it
             rests = before & self.heeds & (self.wants != NOTHING) & ~busy
-            self.alpha = np.where(rests, np.maximum(smooth, guide.settle(off + wrong)), self.alpha)
+            # Who has just passed its place comes no nearer: it prepares where it is.
+            left = np.where(past, 0.0, off)
+            self.alpha = np.where(rests, np.maximum(smooth, guide.settle(left + wrong)), self.alpha)
+            # Who is to turn at its place turns first, whatever level is chosen: prepared it would
+            # take half a minute.
+            turned = 1.0 - (np.abs(askew) - ASKEW) / (AWRY - ASKEW)
+            at_it = self.heeds & (off < NEAR)
+            self.alpha = np.where(
+                at_it, np.minimum(self.alpha, np.clip(turned, 0.0, 1.0)), self.alpha
+            )
             # Who comes to rest, or misses its place after all, does not jump into it or out of it.
             step = STEEPEST / self.fps
             self.alpha = np.where(busy, 0.0, np.clip(self.alpha, was - step, was + step))
         headed = ~np.isnan(self.goal[:, 2])
-        square = np.where(headed, np.clip((NEAR - off) / (NEAR - CLOSE), 0.0, 1.0), 0.0)
+        # Near the place its heading counts more and more; who must turn round goes there first, and
+        # past it only the heading is left.
+        near = np.where(np.abs(askew) > 0.5 * np.pi, 2.0 * CLOSE, NEAR)
+        square = np.where(behind, past, np.clip((near - off) / (near - CLOSE), 0.0, 1.0))
+        square = np.where(headed, square, 0.0)
         by = (1.0 - square) * bearing + square * askew
-        turns = square * np.minimum(np.abs(askew) / AWRY, 1.0)
+        turns = square * np.minimum(np.abs(askew) / ASKEW, 1.0)
         there = np.where(self.heeds, turns, np.clip(1.0 - off / ARRIVED, 0.0, 1.0))
         there = np.where(self.stands, 1.0, there)
         shift = self._steer(by, off < NEAR, there, came_from)
@@ -309,7 +330,10 @@ class Walkers:
         alpha, shift = self.alpha, np.zeros((len(by), 3))
         goes = self.doing == ON_THE_WAY
         turn = self.guide.turn(self.row, by, near, alpha)
-        shift[:, 2] = np.where(goes & ~self.stands, turn / self.fps, 0.0)
+        turn = np.where(goes & ~self.stands, turn, 0.0)
+        most = STARTS_TURNING / self.fps
+        self._turn = np.where(goes, self._turn + np.clip(turn - self._turn, -most, most), 0.0)
+        shift[:, 2] = self._turn / self.fps
         sharp = np.clip((np.abs(by) - SHARP[0]) / (SHARP[1] - SHARP[0]), 0.0, 1.0)
         goes &= self._plays != self._stand  # nobody is held back who stands
         wanted = np.where(goes, ON_THE_SPOT * np.maximum(sharp, there), 0.0)
