@@ -14,7 +14,7 @@ from kumite.control.guide import Guide, learned_guide
 from kumite.graph import Library, builtin_library
 from kumite.graph.hierarchy import ways_into_cores
 from kumite.graph.preparing import KINDS
-from kumite.rotation import angle, planar_apply, planar_compose, planar_inverse, rotate, wrap_angle
+from kumite.rotation import planar_apply, planar_compose, planar_inverse, rotate, wrap_angle
 from kumite.scene import PrepareScene
 from kumite.scene.errands import TargetSettings
 from kumite.scene.settings import SceneSettings
@@ -131,16 +131,12 @@ def test_who_does_nothing_shows_its_cast(guide: Guide):
     homes = np.array([[0.0, 0.0, 0.0], [3.0, -2.0, 1.2]])
     w = some_walkers(guide, homes, "none")
     w.goal[:], w.heeds[:] = homes, False
-    skeleton = guide.library.clips.skeleton
-    upper = slice(1, skeleton.joint("left_thigh"))
     for _ in range(90):
         w.advance()
         assert np.all(w.alpha == 0.0)
-        # Who stands does not drift with what was captured: his legs alone make up for it.
-        np.testing.assert_array_equal(w.shown.wxyz[:, upper], w.cast.wxyz[:, upper])
-        assert angle(w.shown.wxyz, w.cast.wxyz).max() < 0.1
-        np.testing.assert_allclose(w.shown.root_position, w.cast.root_position, atol=0.02)
-        assert np.hypot(*(w.facing - homes)[:, :2].T).max() < 0.02
+        np.testing.assert_array_equal(w.shown.wxyz[:, 1:], w.cast.wxyz[:, 1:])
+        np.testing.assert_allclose(w.shown.root_position, w.cast.root_position, atol=1e-12)
+        np.testing.assert_allclose(w.shown.position, w.cast.position, atol=1e-12)
 
 
 def test_ways_into_cores_are_the_shortest(targets: Library):
