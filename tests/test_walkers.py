@@ -139,7 +139,8 @@ def test_who_does_nothing_shows_its_cast(guide: Guide):
         # Who stands does not drift with what was captured: his legs alone make up for it.
         np.testing.assert_array_equal(w.shown.wxyz[:, upper], w.cast.wxyz[:, upper])
         assert angle(w.shown.wxyz, w.cast.wxyz).max() < 0.1
-        np.testing.assert_allclose(w.shown.root_position, w.cast.root_position, atol=0.02)
+        high = w.shown.root_position[:, 1], w.cast.root_position[:, 1]
+        np.testing.assert_allclose(*high, atol=1e-3)
         assert np.hypot(*(w.facing - homes)[:, :2].T).max() < 0.02
 
 
