@@ -26,7 +26,6 @@ from kumite.rotation import (
 from kumite.synthesis import Cast, LevelFilter, Moment, Preparation, References, references
 from kumite.synthesis.preparation import blended
 
-PREPARATIONS = ("ours", "linear", "none")
 ON_THE_WAY = -1  # what somebody does who does no target motion
 NOTHING = -1  # what somebody prepares for who prepares for nothing
 
@@ -260,8 +259,7 @@ class Walkers:
 
     def advance(self) -> None:
         """Everyone one frame on."""
-        cast, guide = self.cast, self.guide
-        shown = self.shown
+        cast, shown = self.cast, self.shown
         self._before = (shown.root_position.copy(), shown.wxyz.copy())
         self.shown_before = (shown.position.copy(), shown.world_wxyz.copy())
         self._leave_early()
@@ -274,26 +272,8 @@ class Walkers:
         bearing = seen(self.facing, steered_for(self.facing, self.goal))[1]
         behind = np.abs(seen(self.facing, self.goal[:, :2])[1]) > 0.5 * np.pi
         past = behind & (off < OFF)
-        was, self.alpha = self.alpha, np.where(busy, 0.0, smooth)
         askew = np.nan_to_num(wrap_angle(self.goal[:, 2] - self.facing[:, 2]))
-        if self.prepares:
-            # Who is askew has as far to go: prepared it could not turn.
-            wrong = NEAR * np.abs(askew) / AWRY
-            before = (np.abs(bearing) < 0.5 * np.pi) | (off < OFF)  # its place, or at it
-            rests = before & self.heeds & (self.wants != NOTHING) & ~busy
-            # Who has just passed its place comes no nearer: it prepares where it is.
-            left = np.where(past, 0.0, off)
-            self.alpha = np.where(rests, np.maximum(smooth, guide.settle(left + wrong)), self.alpha)
-            # Who is to turn at its place turns first, whatever level is chosen: prepared it would
-            # take half a minute.
-            turned = 1.0 - (np.abs(askew) - ASKEW) / (AWRY - ASKEW)
-            at_it = self.heeds & (off < NEAR)
-            self.alpha = np.where(
-                at_it, np.minimum(self.alpha, np.clip(turned, 0.0, 1.0)), self.alpha
-            )
-            # Who comes to rest, or misses its place after all, does not jump into it or out of it.
-            step = STEEPEST / self.fps
-            self.alpha = np.where(busy, 0.0, np.clip(self.alpha, was - step, was + step))
+        self.alpha = self._levels(smooth, busy, off, bearing, askew, past)
         headed = ~np.isnan(self.goal[:, 2])
         # Near the place its heading counts more and more; who must turn round goes there first, and
         # past it only the heading is left.
@@ -308,6 +288,34 @@ class Walkers:
         self._meet(np.flatnonzero(busy & np.isfinite(self._object[:, 0])), shift)
         self._lead()
         self.shown.show_cast(cast, self.alpha, np.arange(cast.count), shift)
+
+    def _levels(
+        self,
+        smooth: np.ndarray,
+        busy: np.ndarray,
+        off: np.ndarray,
+        bearing: np.ndarray,
+        askew: np.ndarray,
+        past: np.ndarray,
+    ) -> np.ndarray:
+        """Levels [K] to be shown: the ``smooth`` ones, and near their places as these ask for."""
+        alpha = np.where(busy, 0.0, smooth)
+        if not self.prepares:
+            return alpha
+        # Who is askew has as far to go: prepared it could not turn.
+        wrong = NEAR * np.abs(askew) / AWRY
+        before = (np.abs(bearing) < 0.5 * np.pi) | (off < OFF)  # its place, or at it
+        rests = before & self.heeds & (self.wants != NOTHING) & ~busy
+        # Who has just passed its place comes no nearer: it prepares where it is.
+        left = np.where(past, 0.0, off)
+        alpha = np.where(rests, np.maximum(smooth, self.guide.settle(left + wrong)), alpha)
+        # Who is to turn at its place turns first, whatever level is chosen: prepared it would take
+        # half a minute.
+        turned = np.clip(1.0 - (np.abs(askew) - ASKEW) / (AWRY - ASKEW), 0.0, 1.0)
+        alpha = np.where(self.heeds & (off < NEAR), np.minimum(alpha, turned), alpha)
+        # Who comes to rest, or misses its place after all, does not jump into it or out of it.
+        step = STEEPEST / self.fps
+        return np.where(busy, 0.0, np.clip(alpha, self.alpha - step, self.alpha + step))
 
     @property
     def _plays(self) -> np.ndarray:
