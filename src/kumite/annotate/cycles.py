@@ -33,6 +33,9 @@ from kumite.rotation import (
 PARTS = ("upper_arm", "forearm", "thigh", "shin", "foot")
 HEIGHT_WEIGHT = 3.0  # rad/m: 10 cm of pelvis height weigh as 0.3 rad
 
+STAND = "stand"
+SAMPLES = 400  # poses by which it is told what is usual
+
 
 @dataclass(frozen=True)
 class CycleSettings:
@@ -48,6 +51,8 @@ class CycleSettings:
     flight: float = 0.12  # share of a cycle that no foot stands: more is no walk, but, from
     run: float = 1.5  # m/s on, a run
     leap: float = 0.08  # m: below it, a leap if both feet are so high for half that share
+    strange: float = 1.5  # rad farther from the usual than the most usual cycle, nobody stands so:
+    # a T pose
     slack: float = 0.07  # s by which an end may be moved to where it looks more like the start
 
 
@@ -139,7 +144,11 @@ def find_cycles(
         raise KumiteError(
             f"no cycle of locomotion in {len(clips.names)} clip(s) ({clips.seconds:.1f} s): {why}"
         )
-    cycles = _measured(look, [look.name(*r, settings) for r in found], found)
+    named = [(look.name(*r, settings), r) for r in found]
+    odd = [look.strangeness(start) for _, (start, _) in named]
+    usual = min(odd) + settings.strange
+    named = [n for n, strange in zip(named, odd) if n[0] != STAND or strange <= usual]
+    cycles = _measured(look, [name for name, _ in named], [r for _, r in named])
     order = np.argsort(cycles.gap + cycles.skate, kind="stable").tolist()
     kept: list[int] = []
     for i in order:
@@ -232,6 +241,11 @@ class _Look:
         height = HEIGHT_WEIGHT * (self.height[g] - self.height[f])
         return np.sqrt(np.sum(turns**2, axis=(-1, -2)) + height**2)
 
+    def strangeness(self, start: int) -> float:
+        """How far a pose is from those of all clips [rad], the median of a few hundred."""
+        some = np.linspace(0, len(self.clips) - 1, min(len(self.clips), SAMPLES)).astype(np.int64)
+        return float(np.median(self.apart(np.full(len(some), start), some)))
+
     def gap(self, start: int, stop: int | np.ndarray) -> np.ndarray:
         """How far the ends of a cycle are apart, or the poses before them, whichever is more."""
         first = start == self.clips.clip_start[self.clips.clip_of_frame[start]]
@@ -254,7 +268,7 @@ class _Look:
         on_ground = self.contacts.on_ground[start + 1 : stop + 1]
         speed = float(np.hypot(x, z)) / seconds
         if np.all(on_ground) and speed < settings.place:
-            return "stand"
+            return STAND
         off = ~on_ground.any(axis=1)
         if speed > settings.run:
             gait = "run" if np.mean(off) > settings.flight else "walk"

@@ -41,6 +41,7 @@ SMOOTH = 0.05  # s
 NEAR, FAR = 0.25, 1.2  # s before and after it, in which locomotion is left and taken up again …
 UNSTEADY = 0.6  # rad that a start weighs more that is out of balance: no reference posture is near
 CROUCH = 0.25  # … and so much farther from a departure: who jumps crouches first
+WIND_UP = 0.25  # s before its hit in which a blow has begun, at the latest: hooks are fast at once
 MOST = 4  # targets of one name that are kept
 LONGEST = 8.0  # s
 
@@ -82,6 +83,7 @@ def find_targets(
     balance = find_balance(clips, contacts)
     begins = away + np.where(balance.balanced, 0.0, UNSTEADY)
     rows: list[tuple[int, int, int]] = []
+    wind_up = round(WIND_UP * clips.fps)
     for a, b, more in hearts:
         first, last = int(edges[clip[a]]), int(edges[clip[a] + 1]) - 1
         before = np.arange(max(a - more - far, first), a - more - near + 1)
@@ -92,6 +94,9 @@ def find_targets(
         if rows and start < rows[-1][1]:
             continue  # the other one has it
         mark = find_mark(clips, start, stop, None if more else strikes)
+        if not more:
+            hits = strikes.frame[(strikes.frame >= start) & (strikes.frame < stop)]
+            mark = min([mark, *(int(f) - wind_up for f in hits)])
         rows.append((start, stop, min(max(mark, start), stop - 1)))
     if not rows:
         raise KumiteError(
