@@ -16,7 +16,7 @@ def mocap() -> Path:
     """The folder of real motion capture; skips without it, fails without it on CI."""
     where = os.environ.get("KUMITE_MOCAP")
     if where and Path(where).is_dir():
-        return Path(where)
+        return Path(where).resolve()  # some tests work in a folder of their own
     if os.environ.get("CI"):
         pytest.fail("KUMITE_MOCAP must name the folder of motion capture on CI")
     pytest.skip("KUMITE_MOCAP does not name a folder of motion capture")
