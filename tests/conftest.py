@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
 
+from kumite import cli
 from kumite import mocap as mocap_files
 from kumite.graph import Library, build_library, builtin_library
 
@@ -44,3 +46,21 @@ def boxer(mocap: Path) -> Library:
 def fighters() -> Library:
     """The built-in performer's library of whole actions, as it boxes."""
     return builtin_library(None, style="boxing", level="actions")
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    """Run a command line in a folder of its own: (status, stdout, stderr)."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*args: str | Path | float) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["kumite", *map(str, args)])
+        status = 0
+        try:
+            cli.main()
+        except SystemExit as end:
+            status = int(end.code or 0)
+        captured = capsys.readouterr()
+        return status, captured.out, captured.err
+
+    return run

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from kumite import cli
 from kumite.cli.train import _some
 from kumite.control import PreparationSettings, approach_motions, gradual, trained_approach
 from kumite.control import preparation as learning
@@ -30,24 +28,6 @@ def prepared(library: Library) -> Preparing:
 @pytest.fixture(scope="module")
 def library() -> Library:
     return builtin_library(None, style="targets", level="preparation")
-
-
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    """Run a command line in a folder of its own: (status, stdout, stderr)."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*args: str | Path | float) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["kumite", *map(str, args)])
-        status = 0
-        try:
-            cli.main()
-        except SystemExit as end:
-            status = int(end.code or 0)
-        captured = capsys.readouterr()
-        return status, captured.out, captured.err
-
-    return run
 
 
 def test_every_core_that_moves_is_steered(library: Library):

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from kumite import cli
 from kumite import mocap as mocap_files
 from kumite.annotate import find_contacts, find_strikes, read_marked
 from kumite.annotate.action_file import merge, parse, write
@@ -37,24 +35,6 @@ def made():
 @pytest.fixture(scope="module")
 def takes(made) -> ClipSet:
     return concatenate([c for c in made.clips if c.name in TAKES])
-
-
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    """Run a command line in a folder of its own: (status, stdout, stderr)."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*args: str | Path | float) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["kumite", *map(str, args)])
-        status = 0
-        try:
-            cli.main()
-        except SystemExit as end:
-            status = int(end.code or 0)
-        captured = capsys.readouterr()
-        return status, captured.out, captured.err
-
-    return run
 
 
 def row(clip: str, start: int, stop: int, label: str, more: str = "") -> str:
