@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kumite import cli
 from kumite.clip import forward_kinematics
 from kumite.export.bvh import write_bvh
 from kumite.graph import Library, load_library, save_library
@@ -39,21 +38,9 @@ def built_whole(whole: Library, tmp_path_factory: pytest.TempPathFactory) -> Pat
 
 
 @pytest.fixture
-def kumite(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    """Run a command line in a folder of its own: (status, stdout, stderr)."""
-    monkeypatch.chdir(tmp_path)
+def kumite(run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    """Run a command line in a folder of its own, with a cache of its own."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-
-    def run(*args: str | Path) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["kumite", *map(str, args)])
-        status = 0
-        try:
-            cli.main()
-        except SystemExit as end:
-            status = int(end.code or 0)
-        captured = capsys.readouterr()
-        return status, captured.out, captured.err
-
     return run
 
 

@@ -14,7 +14,14 @@ from kumite.control.guide import Guide, learned_guide
 from kumite.graph import Library, builtin_library
 from kumite.graph.hierarchy import ways_into_cores
 from kumite.graph.preparing import KINDS
-from kumite.rotation import planar_apply, planar_compose, planar_inverse, rotate, wrap_angle
+from kumite.rotation import (
+    angle,
+    planar_apply,
+    planar_compose,
+    planar_inverse,
+    rotate,
+    wrap_angle,
+)
 from kumite.scene import PrepareScene
 from kumite.scene.errands import TargetSettings
 from kumite.scene.settings import SceneSettings
@@ -311,3 +318,23 @@ def test_targets_with_the_same_curve_share_a_policy(targets: Library, tmp_path: 
         for c in (1.0, 0.5)
     )
     assert np.hypot(*b[0, 2, :2]) < 0.8 * np.hypot(*a[0, 2, :2])
+
+
+def test_each_target_is_prepared_for_with_its_own_curve(guide: Guide):
+    """The head goes as far towards the posture as the constant of what is prepared for says."""
+    clips = guide.library.clips
+    head, count = clips.skeleton.joint("head"), len(guide.policy_of)
+    curve = np.full((count, len(clips.skeleton)), 0.5)
+    curve[:, head] = np.linspace(0.25, 2.0, count)
+    w = Walkers(guide, np.zeros((1, 3)), lambda kind, k, **data: None, curve=curve)
+    w.heeds[:] = False
+    for t in range(count):
+        w.wants[:] = t
+        for _ in range(round(2.5 * w.fps)):
+            w._lead()
+        np.testing.assert_allclose(w.shown.postures.curve[0], curve[t], atol=1e-2)
+        w.shown.show_cast(w.cast, 0.5, np.arange(1))
+        way = angle(w.cast.wxyz[0, head], w.like.wxyz[t, head])
+        gone = angle(w.cast.wxyz[0, head], w.shown.wxyz[0, head])
+        c = curve[t, head]
+        assert gone == pytest.approx((1 - 0.5 ** (1 / c)) ** c * way, abs=0.01)

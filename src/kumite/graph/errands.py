@@ -22,7 +22,7 @@ from kumite.clip import ClipSet
 from kumite.errors import KumiteError
 from kumite.graph.distance import pose_features
 from kumite.graph.hierarchy import ALIKE, Targets, build_hierarchy, check_targets, hierarchy_table
-from kumite.graph.library import Library
+from kumite.graph.library import Library, counted
 from kumite.graph.preparing import Preparing, find_about, own_blows
 
 
@@ -95,7 +95,6 @@ def build_preparation_library(
     kept = np.zeros(len(clips), dtype=bool)
     for first, last in zip(table.first.tolist(), table.last.tolist()):
         kept[first : last + 1] = True
-    jumps = table.join_cost[table.join_cost > 0]
     report = {
         "level": "preparation",
         "alike": float(alike),
@@ -106,13 +105,7 @@ def build_preparation_library(
         "cores": list(cycles.label),
         "targets": list(targets.label),
         "fall_back": [targets.label[t] for t in range(count) if not references[t].found],
-        "states": table.states,
-        "actions": table.actions,
-        "stretches": len(table.first),
-        "mean_action_s": float(table.duration[table.stretch].mean() / clips.fps),
-        "mean_join_cost": float(jumps.mean()) if len(jumps) else 0.0,
-        "hits": len(strikes),
-        "hits_kept": int(kept[strikes.frame].sum()),
+        **counted(clips, table, strikes, kept),
     }
     return Library(clips, contacts, strikes, table, report, preparing=preparing)
 

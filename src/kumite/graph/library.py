@@ -158,7 +158,6 @@ def folded(
     """
     kept = strongest_component(clips, transitions)
     table = fold(clips, transitions, kept)
-    jumps = table.join_cost[table.join_cost > 0]
     report = {
         **told,
         "fps": clips.fps,
@@ -167,6 +166,17 @@ def folded(
         "candidates": transitions.candidates,
         "transitions": len(transitions),
         "threshold": transitions.threshold,
+        **counted(clips, table, strikes, kept),
+    }
+    return Library(clips, contacts, strikes, table, report, None, parts)
+
+
+def counted(
+    clips: ClipSet, table: ActionTable, strikes: Strikes, kept: np.ndarray
+) -> dict[str, Any]:
+    """What a report says of a table. kept [F]: the frames that are in it."""
+    jumps = table.join_cost[table.join_cost > 0]
+    return {
         "states": table.states,
         "actions": table.actions,
         "stretches": len(table.first),
@@ -175,7 +185,6 @@ def folded(
         "hits": len(strikes),
         "hits_kept": int(kept[strikes.frame].sum()),
     }
-    return Library(clips, contacts, strikes, table, report, None, parts)
 
 
 def chosen_parts(

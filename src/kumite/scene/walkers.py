@@ -506,12 +506,14 @@ class Walkers:
         share = np.where(self.alpha[who] < UNSEEN, 1.0, share)
         if at_once is not None:
             share = np.ones(len(who))
-        like, which = self.like, wants[who]
+        like, which, curve = self.like, wants[who], self.curve
         if np.any(mixed[who]):
             sure = np.eye(len(like))[which]
-            like = blended(like, np.where(mixed[who, None], self.mix[who], sure))
-            which = np.arange(len(who))
-        left = self.shown.lead(who, like, which, share)
+            weight = np.where(mixed[who, None], self.mix[who], sure)
+            weight = weight / weight.sum(axis=1, keepdims=True)
+            like, which = blended(like, weight), np.arange(len(who))
+            curve = None if curve is None else weight @ curve
+        left = self.shown.lead(who, like, which, share, None if curve is None else curve[which])
         self._settled[who] = (left < ALIKE) & ~mixed[who]
 
     def _moment(self, k: int) -> Moment:

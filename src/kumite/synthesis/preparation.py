@@ -217,14 +217,22 @@ class Preparation:
         self.going.lag[k] = planar_compose(facing, planar_inverse(facing_now))
 
     def lead(
-        self, rows: np.ndarray, like: References, which: np.ndarray, share: np.ndarray | float
+        self,
+        rows: np.ndarray,
+        like: References,
+        which: np.ndarray,
+        share: np.ndarray | float,
+        curve: np.ndarray | None = None,
     ) -> np.ndarray:
         """Let postures ``rows`` [N] become more like postures ``which`` [N] of ``like``, by shares
-        [N] of what differs: how much is left [N], the most of any number."""
+        [N] of what differs: how much is left [N], the most of any number. curve [N, J]: constants C
+        that these shall have; None: those they have."""
         mine, left = self.postures, np.zeros(len(rows))
         part = np.broadcast_to(np.asarray(share, dtype=np.float64), (len(rows),))
-        for name in ("root", "ankle", "wxyz"):
-            array, goal = getattr(mine, name), getattr(like, name)[which]
+        goals = {name: getattr(like, name)[which] for name in ("root", "ankle", "wxyz")}
+        goals |= {} if curve is None else {"curve": curve}
+        for name, goal in goals.items():
+            array = getattr(mine, name)
             now = array[rows]
             if name == "wxyz":  # the nearer of the two quaternions that mean the same
                 goal = np.where(np.sum(now * goal, axis=-1, keepdims=True) < 0, -goal, goal)
