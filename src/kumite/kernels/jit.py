@@ -4,31 +4,44 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import re
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from types import FunctionType
 from typing import Any
 
 from numba import njit
 
+_IMPORT = re.compile(rb"^from kumite\.kernels\.(\w+) import", re.MULTILINE)
+
+
 # Numba keeps compiled code while the function's own file is the same; but a kernel holds the code
-# and the constants of those it calls in other files. So what is kept is kept for all files at once.
-_SOURCES = hashlib.sha256(
-    b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
-).hexdigest()
+# and the constants of those it calls in other files. So it is kept while all of those are the same.
+@cache
+def _sources(file: str) -> tuple[str, ...]:
+    """The digests of a file and of every kernel module that it imports, directly or not."""
+    found: dict[Path, bytes] = {}
+    waiting = [Path(file)]
+    while waiting:
+        path = waiting.pop()
+        if path in found or not path.is_file():
+            continue
+        found[path] = path.read_bytes()
+        names = _IMPORT.findall(found[path])
+        waiting += [Path(__file__).with_name(f"{name.decode()}.py") for name in names]
+    return tuple(sorted(hashlib.sha256(text).hexdigest() for text in found.values()))
 
 
 def _stamp(dispatcher: Any, *more: Any) -> None:
-    """Keep its compiled code only while all our files, its own (it may be elsewhere) and those
-    behind ``more`` dispatchers are the same."""
+    """Keep its compiled code only while the sources behind it, and behind ``more``, are the same."""
     # Not a public name; where it is gone (or nothing is compiled) Numba's own rule holds.
     with contextlib.suppress(AttributeError):
-        file = dispatcher._cache._cache_file
-        others = tuple(other._cache._cache_file._source_stamp for other in more)
-        file._source_stamp = (_SOURCES, file._source_stamp, *others)
+        files = [d.py_func.__code__.co_filename for d in (dispatcher, *more)]
+        dispatcher._cache._cache_file._source_stamp = tuple(_sources(file) for file in files)
 
 
-def _kept_while_all_sources_are(decorate: Callable[..., Any]) -> Callable[..., Any]:
+def _kept_while_its_sources_are(decorate: Callable[..., Any]) -> Callable[..., Any]:
     def compile_lazily(function: Callable[..., Any]) -> Any:
         dispatcher = decorate(function)
         _stamp(dispatcher)
@@ -40,13 +53,13 @@ def _kept_while_all_sources_are(decorate: Callable[..., Any]) -> Callable[..., A
 # error_model="numpy": no exceptions inside loops. Of fast-math only contraction (fused
 # multiply-add): nothing is reordered, so a run gives the same bytes as the last, whatever the
 # number of threads.
-kernel = _kept_while_all_sources_are(
+kernel = _kept_while_its_sources_are(
     njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 )
 # Numba counts who uses an array whenever a tuple of arrays is looked into, one count for all cores:
 # most of the time of small kernels that are handed large tuples. These count nothing, so they must
 # neither make arrays nor return any to a kernel that counts. (Not a public option.)
-lean_kernel = _kept_while_all_sources_are(
+lean_kernel = _kept_while_its_sources_are(
     njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, _nrt=False)  # type: ignore[call-overload]
 )
 
