@@ -34,7 +34,7 @@ def _sources(file: str) -> tuple[str, ...]:
 
 
 def _stamp(dispatcher: Any, *more: Any) -> None:
-    """Keep its compiled code only while the sources behind it, and behind ``more``, are the same."""
+    """Keep its compiled code while the sources behind it, and behind ``more``, are the same."""
     # Not a public name; where it is gone (or nothing is compiled) Numba's own rule holds.
     with contextlib.suppress(AttributeError):
         files = [d.py_func.__code__.co_filename for d in (dispatcher, *more)]
