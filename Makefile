@@ -1,37 +1,48 @@
 # make demo: two boxers spar in the browser.   make test: the whole suite.
-# Both set up everything in .venv first; nothing else is needed but Python ≥ 3.11.
+# Both set up what they need in .venv first; nothing else is needed but Python ≥ 3.11.
 
 PYTHON ?= python3
 BIN := .venv/bin
-STAMP := .venv/.ready
+RUN := .venv/.ready-to-run
+DEV := .venv/.ready-to-test
 
-.PHONY: demo test fast lint bench clean
+.PHONY: demo test fast lint bench lock clean
 
-demo: $(STAMP)
+demo: $(RUN)
 	$(BIN)/kumite studio sparring
 
 test: lint
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -m jit_off
 
-fast: $(STAMP)
+fast: $(DEV)
 	$(BIN)/python -m pytest -m "not slow"
 
-lint: $(STAMP)
+lint: $(DEV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/basedpyright --level error
 	$(BIN)/lint-imports
 
-bench: $(STAMP)
+bench: $(RUN)
 	$(BIN)/kumite bench
 
-$(STAMP): pyproject.toml constraints.txt
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
-	    { echo "Kumite needs Python 3.11 or later; set PYTHON=/path/to/python3.11" >&2; exit 2; }
-	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,physics]'
+$(RUN): pyproject.toml requirements/run.txt
+	@$(PYTHON) requirements/install.py run
 	@touch $@
+
+$(DEV): pyproject.toml requirements/run.txt requirements/dev.txt
+	@$(PYTHON) requirements/install.py dev
+	@touch $(RUN) $@
+
+# Renews requirements/: the newest versions that pyproject.toml allows, on every system.
+LOCK := uv --quiet pip compile --universal --python-version 3.11 --generate-hashes --upgrade \
+    --no-header --no-annotate
+lock: export PATH := $(CURDIR)/$(BIN):$(PATH)
+lock: $(RUN)
+	echo uv | $(LOCK) - -o requirements/uv.txt
+	$(LOCK) pyproject.toml --group build --extra physics -o requirements/run.txt
+	$(LOCK) pyproject.toml --group build --all-extras -c requirements/run.txt -o requirements/dev.txt
 
 clean:
 	rm -rf .venv build dist .pytest_cache .ruff_cache .hypothesis src/kumite.egg-info
