@@ -128,10 +128,27 @@ def test_bent_joints_keep_their_girth(skeleton: Skeleton, role: str):
 
 def test_palettes_colour_every_role():
     mesh = bodies.body_mesh(toys.skeleton())
-    for k in range(8):
-        colours = mesh.colours(bodies.palette(k))
-        assert colours.shape == (len(mesh), 3) and colours.min() >= 0 and colours.max() <= 1
-    assert bodies.palette(0) != bodies.palette(1)
+    for palette in bodies.palettes(["red", "anna"]):
+        colours = mesh.colours(palette)
+        assert colours.shape == (len(mesh), 3) and colours.min() >= 0 and 0.5 < colours.max() <= 1
+
+
+def test_colours_go_by_name():
+    red, blue = bodies.main_colours(["red", "blue"])
+    assert red[0] > 2 * max(red[1:]) and blue[2] > 2 * blue[0]
+    assert bodies.main_colours(["blue", "red"]) == [blue, red]  # as in slip
+    assert bodies.main_colours(["anna", "Red 2", "blue"])[1:] == [red, blue]
+    # The same alone and among others, and nobody like another.
+    assert (
+        bodies.main_colours(["walker 7"])
+        == bodies.main_colours([f"walker {n + 1}" for n in range(9)])[6:7]
+    )
+    found = []
+    for others in (["red", "amber", "blue"], ["anna", "bert"], []):
+        found = bodies.main_colours([*others, *(f"boxer {n + 1}" for n in range(1000)), "zoe"])
+        assert len(set(found)) == len(found)
+    apart = [np.linalg.norm(np.subtract(a, b)) for i, a in enumerate(found[:8]) for b in found[:i]]
+    assert min(apart) > 50
 
 
 def test_bodies_that_cannot_be_laid():

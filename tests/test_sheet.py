@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from kumite.body import body_mesh, palette
+from kumite.body import body_mesh, palettes
 from kumite.clip import forward_kinematics
 from kumite.errors import KumiteError
 from kumite.export.plot import plot_hits
@@ -58,7 +58,7 @@ def test_feet_stand_on_the_floor_and_the_figure_fills_the_cell():
     skeleton, root, wxyz = _still()
     position, world = forward_kinematics(skeleton, root[0], wxyz[0])
     camera = look(np.array([0.0, 1.0, 0.0]), 0.0, 0.0, 2.5, (200, 250))
-    shape = body_shape(body_mesh(skeleton), skeleton, position[0], world[0], palette(0))
+    shape = body_shape(body_mesh(skeleton), skeleton, position[0], world[0], palettes(["red"])[0])
     xy, near = camera.project(shape.vertices)
     assert (near > 0).all()
     image = render(camera, [shape]).astype(int)

@@ -2,7 +2,7 @@
 
 from kumite.body.apart import Apart, keep_out
 from kumite.body.mesh import ROLES, BodyMesh, body_mesh, skin_vertices
-from kumite.body.palette import PALETTES, Palette, palette
+from kumite.body.palette import RGB, Palette, main_colours, mix, palettes
 from kumite.body.segments import ARMS, PARTS, Body, lay_body
 from kumite.body.spheres import (
     Spheres,
@@ -15,8 +15,8 @@ from kumite.body.spheres import (
 
 __all__ = [
     "ARMS",
-    "PALETTES",
     "PARTS",
+    "RGB",
     "ROLES",
     "Apart",
     "Body",
@@ -29,7 +29,9 @@ __all__ = [
     "lay_spheres",
     "limb_spheres",
     "load_spheres",
-    "palette",
+    "main_colours",
+    "mix",
+    "palettes",
     "save_spheres",
     "skin_vertices",
     "strikes_with",

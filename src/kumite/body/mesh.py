@@ -49,9 +49,9 @@ class BodyMesh:
     def __len__(self) -> int:
         return len(self.vertices)
 
-    def colours(self, palette: Mapping[str, tuple[float, float, float]]) -> np.ndarray:
-        """Colours [V, 3] from a palette that gives every role one (0..1)."""
-        return np.array([palette[r] for r in ROLES], dtype=np.float32)[self.role]
+    def colours(self, palette: Mapping[str, tuple[int, int, int]]) -> np.ndarray:
+        """Colours [V, 3], 0..1, from a palette that gives every role one (0..255)."""
+        return (np.array([palette[r] for r in ROLES], dtype=np.float32) / 255.0)[self.role]
 
 
 def skin_vertices(

@@ -16,7 +16,7 @@ import numpy as np
 import pygltflib as gltf
 
 from kumite import files
-from kumite.body import BodyMesh, body_mesh, palette
+from kumite.body import BodyMesh, Palette, body_mesh, palettes
 from kumite.body.mesh import ROLES
 from kumite.clip import MOST_FRAMES, NO_PARENT, Skeleton
 from kumite.errors import KumiteError
@@ -49,8 +49,10 @@ def write_glb(path: Path | str, recording: Recording, *, fps: float | None = Non
     for armed in sorted({name not in unarmed for name in recording.names}):
         skins[armed] = _share_mesh(document, body_mesh(recording.skeleton, armed=armed))
     bind = document.add(_inverse_bind(recording.skeleton), gltf.MAT4)
+    outfits = palettes(recording.names)
     for k, name in enumerate(recording.names):
-        _add_character(document, recording, k, name, skins[name not in unarmed], bind)
+        skin = skins[name not in unarmed]
+        _add_character(document, recording, k, name, skin, bind, outfits[k])
     _add_objects(document, recording)
     with files.writing(path) as temporary:
         temporary.write_bytes(document.to_bytes())
@@ -219,12 +221,13 @@ def _add_character(
     name: str,
     skin_data: list[tuple[str, dict[str, Any], int]],
     bind: int,
+    palette: Palette,
 ) -> None:
     skeleton = recording.skeleton
-    colours = palette(k)
     primitives = []
     for role, attributes, indices in skin_data:
-        material = document.add_material(f"{name} {role}", colours[role], _ROUGHNESS.get(role, 0.8))
+        r, g, b = (c / 255.0 for c in palette[role])
+        material = document.add_material(f"{name} {role}", (r, g, b), _ROUGHNESS.get(role, 0.8))
         primitives.append(
             gltf.Primitive(
                 attributes=gltf.Attributes(**attributes), indices=indices, material=material

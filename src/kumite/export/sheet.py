@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from kumite import files
-from kumite.body import BodyMesh, Palette, body_mesh, palette, skin_vertices
+from kumite.body import BodyMesh, Palette, body_mesh, palettes, skin_vertices
 from kumite.clip import Skeleton, facing_frame, forward_kinematics
 from kumite.errors import KumiteError, unknown
 from kumite.kernels.raster import draw_triangles
@@ -282,7 +282,8 @@ def contact_sheet(
     if len(names) != len(shown):
         raise KumiteError(f"sheet: {len(names)} labels for {len(shown)} frames")
     characters = root_position.shape[1]
-    looks = [palette(k) for k in range(characters)] if colours is None else list(colours)
+    numbers = [str(k + 1) for k in range(characters)]
+    looks = palettes(numbers) if colours is None else list(colours)
     if len(looks) < characters:
         raise KumiteError(f"sheet: colours for {len(looks)} of {characters} characters")
     things = np.zeros((count, 0, 3)) if object_position is None else np.asarray(object_position)
@@ -329,7 +330,7 @@ def recording_sheet(
         chosen,
         columns=columns,
         view=view,
-        colours=colours,
+        colours=palettes(recording.names) if colours is None else colours,
         size=size,
         labels=[f"{f / recording.fps:.2f} s" for f in chosen],
         follow=follow,

@@ -16,11 +16,10 @@ from typing import Protocol
 import numpy as np
 import viser
 
-from kumite.body import ROLES, BodyMesh, body_mesh
+from kumite.body import RGB, ROLES, BodyMesh, Palette, body_mesh, mix, palettes
 from kumite.body.spheres import SWORD
 from kumite.clip import Skeleton
 from kumite.scene.stage import OUT_OF_SIGHT
-from kumite.studio.palette import RGB, mix, outfit
 from kumite.studio.ring import STAGE
 
 CROWD = 9  # characters from which on they are drawn as a crowd
@@ -73,7 +72,7 @@ def cut(mesh: BodyMesh, weights: np.ndarray, faces: np.ndarray) -> Piece:
     )
 
 
-def faces_by_colour(mesh: BodyMesh, colours: dict[str, RGB]) -> list[tuple[str, np.ndarray]]:
+def faces_by_colour(mesh: BodyMesh, colours: Palette) -> list[tuple[str, np.ndarray]]:
     """Faces [p, 3] of every colour, with a role that wears it."""
     role = mesh.role[mesh.faces[:, 0]]
     groups: dict[RGB, list[int]] = {}
@@ -107,15 +106,14 @@ class SkinnedBodies:
         server: viser.ViserServer,
         skeleton: Skeleton,
         mesh: BodyMesh,
-        count: int,
+        names: Sequence[str],
         own: Mapping[int, BodyMesh] | None = None,
     ) -> None:
         """own: meshes of characters who do not have the common one."""
         rest = skeleton.rest_positions
-        self._flashes = _Flashes(count)
+        self._flashes = _Flashes(len(names))
         self._meshes: list[list[tuple[viser.MeshSkinnedHandle, np.ndarray, RGB]]] = []
-        for k in range(count):
-            colours = outfit(k)
+        for k, colours in enumerate(palettes(names)):
             mesh_of = (own or {}).get(k, mesh)
             weights = dense_weights(mesh_of, len(skeleton))
             parts = []
@@ -161,9 +159,10 @@ class CrowdBodies:
         server: viser.ViserServer,
         skeleton: Skeleton,
         mesh: BodyMesh,
-        count: int,
+        names: Sequence[str],
         unarmed: np.ndarray,
     ) -> None:
+        count, outfits = len(names), palettes(names)
         weights = dense_weights(mesh, len(skeleton))
         self._sword, self._unarmed = skeleton.roles.get(SWORD), unarmed
         rest = skeleton.rest_positions
@@ -174,7 +173,7 @@ class CrowdBodies:
         share = weights[mesh.faces].mean(axis=1)  # [P, J]
         most = share.argmax(axis=1)
         for i, role in enumerate(ROLES):
-            colours = np.array([outfit(k)[role] for k in range(count)], dtype=np.uint8)
+            colours = np.array([outfit[role] for outfit in outfits], dtype=np.uint8)
             for j in range(len(skeleton)):
                 own = (role_of_face == i) & ((share[:, j] >= SHARE_OF_PIECE) | (most == j))
                 if not np.any(own & (most == j)):
@@ -223,7 +222,7 @@ def show_bodies(
     """
     if len(names) >= CROWD:
         bare_handed = np.array([name in unarmed for name in names])
-        return CrowdBodies(server, skeleton, mesh, len(names), bare_handed)
+        return CrowdBodies(server, skeleton, mesh, names, bare_handed)
     bare = body_mesh(skeleton, armed=False) if unarmed else mesh
     own = {k: bare for k, name in enumerate(names) if name in unarmed}
-    return SkinnedBodies(server, skeleton, mesh, len(names), own)
+    return SkinnedBodies(server, skeleton, mesh, names, own)

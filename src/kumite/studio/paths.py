@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 import viser
 
+from kumite.body import main_colours, mix
 from kumite.control import Route
 from kumite.control.routes import through
-from kumite.studio.palette import corner, mix
 from kumite.studio.ring import STAGE
 
 LIFT = 0.012  # m above the floor
@@ -68,13 +68,15 @@ class Paths:
     def __init__(
         self,
         server: viser.ViserServer,
+        names: Sequence[str],
         moved: Callable[[int, int, np.ndarray, np.ndarray], None],
     ) -> None:
-        """moved: told whose check point is dragged, which, and the ray [3], [3] in the page's world
-        that points to its new place.
+        """names: of all fighters. moved: told whose check point is dragged, which, and the ray [3],
+        [3] in the page's world that points to its new place.
         """
         self._scene = server.scene
         self._moved = moved
+        self._colours = main_colours(names)
         self._shown: dict[int, Path] = {}
         self._handles: dict[int, list[viser.SceneNodeHandle]] = {}
         self._disc = _disc()
@@ -99,7 +101,7 @@ class Paths:
 
     def _show(self, path: Path) -> None:
         before, who = self._shown.get(path.who), path.who
-        count, colour = len(path.route), corner(path.who)
+        count, colour = len(path.route), self._colours[path.who]
         place = np.zeros((count, 3))
         place[:, [0, 2]] = path.route.places
         place[:, 1] = LIFT

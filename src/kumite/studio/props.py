@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import viser
 
+from kumite.body import RGB, mix
 from kumite.rotation import from_yaw
 from kumite.scene.look import Part, shown
 from kumite.scene.stage import SceneObject, in_sight
-from kumite.studio.palette import RGB, mix
 from kumite.studio.ring import STAGE
 
 TARGET_COLOUR: RGB = (246, 196, 60)

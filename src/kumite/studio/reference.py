@@ -16,14 +16,13 @@ from scipy.spatial import ConvexHull
 
 from kumite.annotate.balance import centre_of_mass, support
 from kumite.annotate.reference import where_found
-from kumite.body import BodyMesh, skin_vertices
+from kumite.body import RGB, BodyMesh, main_colours, mix, skin_vertices
 from kumite.rotation import from_yaw, planar_apply, planar_inverse
 from kumite.scene import PrepareScene
 from kumite.scene.look import line
 from kumite.scene.opponents import NOBODY
 from kumite.scene.prepare import NO_THING
 from kumite.scene.walkers import NOTHING, ON_THE_WAY
-from kumite.studio.palette import RGB, corner, mix
 from kumite.studio.ring import STAGE
 
 BODY_COLOUR: RGB = (150, 210, 255)
@@ -179,7 +178,9 @@ class Prepared:
         if picture.goal is not None:
             if self._of != picture.asked.who:
                 self._of = picture.asked.who
-                self._ring.color = mix(corner(self._of), (255, 255, 255), 0.3)
+                self._ring.color = mix(
+                    main_colours(self.scene.names)[self._of], (255, 255, 255), 0.3
+                )
             self._ring.position = np.insert(picture.goal, 1, 0.0)
         self._switch(self._ring, picture.goal is not None)
         t = picture.target

@@ -110,7 +110,7 @@ class Studio:
         self._volumes = None if dodge is None else Volumes(server, dodge)
         self._prepared = None if self._walk is None else Prepared(server, self._walk, mesh)
         self._sketch = Sketch()
-        self._paths = Paths(server, self._move_check_point)
+        self._paths = Paths(server, stage.names, self._move_check_point)
         self._panel = Panel(
             server,
             self,

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 import viser
 
+from kumite.body import RGB
 from kumite.control.attack import Attack
 from kumite.control.avoidance import Plan
 from kumite.scene import DodgeScene
 from kumite.scene.volumes import Volume, attack_volume, attacks_on, avoidance_volume, body_volume
-from kumite.studio.palette import RGB
 from kumite.studio.ring import STAGE
 
 BODY_COLOUR: RGB = (110, 190, 255)

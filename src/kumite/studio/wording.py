@@ -7,14 +7,15 @@ from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from kumite.body import main_colours, mix
 from kumite.scene.dodge import DodgeScene
 from kumite.scene.prepare import PrepareScene
 from kumite.scene.recording import Event
 from kumite.scene.stage import Playback, Stage
 from kumite.scene.walkers import OFF
-from kumite.studio import palette
 
 LINES = 12  # events on the panel
+GREY = "#9aa0aa"  # of whoever has no colour
 LANDED = frozenset({"hit", "struck"})  # kinds that are seen where they land
 QUIET_KINDS = frozenset({"decision"})  # several a second: shown only when asked for
 MARKS = {
@@ -222,6 +223,8 @@ class EventLog:
         self, names: Sequence[str], *, dodging: bool = False, preparing: bool = False
     ) -> None:
         self.names, self.dodging, self.preparing = tuple(names), dodging, preparing
+        light = [mix(colour, (255, 255, 255), 0.35) for colour in main_colours(self.names)]
+        self.colours = {n: "#{:02x}{:02x}{:02x}".format(*c) for n, c in zip(self.names, light)}
         self.show_quiet = False
         self.rewind()
 
@@ -272,12 +275,6 @@ class EventLog:
         return list(self._all if self.show_quiet else self._loud)[::-1]
 
 
-def _colour_of(name: str, names: Sequence[str]) -> str:
-    if name not in names:
-        return "#9aa0aa"
-    return palette.css(palette.mix(palette.corner(names.index(name)), (255, 255, 255), 0.35))
-
-
 def score_html(log: EventLog, most: int = 8) -> str:
     """Strikes and hits of every character, or balls thrown at each, avoided and not; the busiest
     ``most`` of a crowd, and the sum over all at whom balls are thrown.
@@ -290,7 +287,7 @@ def score_html(log: EventLog, most: int = 8) -> str:
     key = log.thrown if log.dodging else log.landed
     order = sorted(log.names, key=lambda n: -key[n]) if len(log.names) > most else log.names
     rows = "".join(
-        _score_row(n, _colour_of(n, log.names), [c[n] for c in columns.values()])
+        _score_row(n, log.colours.get(n, GREY), [c[n] for c in columns.values()])
         for n in order[:most]
     )
     if log.dodging and len(log.names) > 1:
@@ -312,7 +309,7 @@ def _score_row(name: str, colour: str, counts: Sequence[int]) -> str:
     return f'<tr><td style="color:{colour};font-weight:600">{html.escape(name)}</td>{cells}</tr>'
 
 
-def _line_html(event: Event, fps: float, names: Sequence[str], faded: float) -> str:
+def _line_html(event: Event, fps: float, colours: Mapping[str, str], faded: float) -> str:
     said = describe(event)
     if event.kind not in ("strike", "hit", *TOLD):
         said = f"{_words(event.kind)}: {said}" if said else _words(event.kind)
@@ -321,7 +318,7 @@ def _line_html(event: Event, fps: float, names: Sequence[str], faded: float) -> 
     return (
         f'<tr style="opacity:{1 - faded:.2f}">'
         f'<td style="opacity:.6;{cell}">{event.frame / fps:.1f}</td>'
-        f'<td style="color:{_colour_of(event.character, names)};{cell}">'
+        f'<td style="color:{colours.get(event.character, GREY)};{cell}">'
         f"{MARKS.get(event.kind, '▪')} {html.escape(event.character)}</td>"
         f'<td style="font-weight:{weight}">{html.escape(said)}</td></tr>'
     )
@@ -330,7 +327,7 @@ def _line_html(event: Event, fps: float, names: Sequence[str], faded: float) -> 
 def lines_html(log: EventLog, fps: float) -> str:
     """The last events, newest first: when, who, what."""
     rows = "".join(
-        _line_html(event, fps, log.names, min(0.05 * i, 0.5)) for i, event in enumerate(log.lines)
+        _line_html(event, fps, log.colours, min(0.05 * i, 0.5)) for i, event in enumerate(log.lines)
     )
     return (
         '<div style="padding:0 1em .6em;font-size:.8em;line-height:1.35;min-height:16em">'
