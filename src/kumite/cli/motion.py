@@ -10,61 +10,19 @@ from rich.table import Table
 
 from kumite.cli.app import JsonOption, Stages, app, err, out, print_json, progress
 from kumite.cli.library import is_library, library_lines, library_values, show_library
+from kumite.cli.reading import FpsOption, Reading, Source, reads_mocap
 from kumite.errors import KumiteError, unknown
 
 SHORTEST_ACTION = 0.25  # s; below it a graph is too fine to fight by
 
-Source = Annotated[
-    list[str], typer.Argument(help="Mocap: a folder, a glob, .bvh files, .amc files.")
-]
 SourceOrLibrary = Annotated[
     list[str],
     typer.Argument(help="Mocap: a folder, a glob, .bvh files, .amc files; or one library."),
 ]
-ScaleOption = Annotated[
-    float | None, typer.Option(help="Length of the files' unit [m] (else inferred).")
-]
-UpOption = Annotated[str | None, typer.Option(help="Up axis of the files, Y or Z (else inferred).")]
-GroundOption = Annotated[
-    float | None, typer.Option(help="Height of the floor in the files [m] (else inferred).")
-]
-RoleOption = Annotated[
-    list[str] | None,
-    typer.Option("--role", help="ROLE=JOINT, where names say too little; may be repeated."),
-]
-FpsOption = Annotated[float | None, typer.Option(help="Resample to this rate [frames/s].")]
-FileFpsOption = Annotated[
-    float | None, typer.Option(help="The files' own rate, where they do not state it.")
-]
-
-
-def _roles(pairs: list[str] | None) -> dict[str, str]:
-    roles = {}
-    for pair in pairs or []:
-        role, equals, joint = pair.partition("=")
-        if not equals:
-            raise KumiteError(f"--role {pair!r}: expected ROLE=JOINT, such as left_hand=LWrist")
-        roles[role] = joint
-    return roles
-
-
-def _load_clips(source: list[str], fps, file_fps, metres_per_unit, up_axis, ground, role) -> Any:
-    from kumite import mocap
-
-    with progress() as bars:
-        Stages(bars)("reading motion capture")
-        return mocap.load(
-            source,
-            fps=fps,
-            file_fps=file_fps,
-            metres_per_unit=metres_per_unit,
-            up_axis=up_axis,
-            ground=ground,
-            roles=_roles(role),
-        )
 
 
 @app.command()
+@reads_mocap
 def info(
     source: SourceOrLibrary,
     plot: Annotated[
@@ -72,29 +30,18 @@ def info(
     ] = None,
     as_json: JsonOption = False,
     fps: FpsOption = None,
-    file_fps: FileFpsOption = None,
-    metres_per_unit: ScaleOption = None,
-    up_axis: UpOption = None,
-    ground: GroundOption = None,
-    role: RoleOption = None,
+    *,
+    reading: Reading,
 ) -> None:
     """What is in motion capture files (rates, blows, all that was inferred), or in a library."""
     from kumite.annotate import Strikes, find_strikes
     from kumite.clip import LIMBS, check, concatenate
 
     if len(source) == 1 and is_library(source[0]):
-        reading = {
-            "--fps": fps,
-            "--file-fps": file_fps,
-            "--metres-per-unit": metres_per_unit,
-            "--up-axis": up_axis,
-            "--ground": ground,
-            "--role": role,
-        }
-        given = [name for name, value in reading.items() if value is not None]
+        given = [*([] if fps is None else ["--fps"]), *reading.given()]
         show_library(source[0], plot, as_json, given)
         return
-    loaded = _load_clips(source, fps, file_fps, metres_per_unit, up_axis, ground, role)
+    loaded = reading.load(source, fps)
     hits: dict[str, dict[str, int]] = {}
     every: list[Strikes] = []
     for group in loaded.by_skeleton():
@@ -156,6 +103,7 @@ def info(
 
 
 @app.command()
+@reads_mocap
 def build(
     source: Source,
     output: Annotated[Path, typer.Option("--output", "-o", help="The library file to write.")],
@@ -222,11 +170,8 @@ def build(
     ] = None,
     as_json: JsonOption = False,
     fps: FpsOption = None,
-    file_fps: FileFpsOption = None,
-    metres_per_unit: ScaleOption = None,
-    up_axis: UpOption = None,
-    ground: GroundOption = None,
-    role: RoleOption = None,
+    *,
+    reading: Reading,
 ) -> None:
     """Build a library: clips, contacts, effective hits and the motion graph, in one file."""
     from kumite.annotate import read_actions, read_avoidance
@@ -257,7 +202,7 @@ def build(
         },
     )
     refuse_unwritable(output)  # before the work, not after
-    loaded = _load_clips(source, fps, file_fps, metres_per_unit, up_axis, ground, role)
+    loaded = reading.load(source, fps)
     with progress() as bars:
         stages, clips = Stages(bars), loaded.clip_set()
         parts = read_avoidance(actions, clips) if avoidance and actions else avoidance
@@ -410,6 +355,7 @@ def _write_performance(folder: Path, made: Any, stage: Stages) -> None:
 
 
 @app.command()
+@reads_mocap
 def likeness(
     source: Annotated[
         list[str] | None, typer.Argument(help="Mocap: a folder, a glob, .bvh files, .amc files.")
@@ -419,11 +365,8 @@ def likeness(
         typer.Option(help="A style of the built-in performer; may be repeated."),
     ] = None,
     as_json: JsonOption = False,
-    file_fps: FileFpsOption = None,
-    metres_per_unit: ScaleOption = None,
-    up_axis: UpOption = None,
-    ground: GroundOption = None,
-    role: RoleOption = None,
+    *,
+    reading: Reading,
 ) -> None:
     """How like a person clips move: joints, foot skate, balance, blows and steps, side by side."""
     from kumite.annotate import measure_likeness
@@ -434,7 +377,7 @@ def likeness(
         raise KumiteError("name motion capture files, or a --style of the built-in performer")
     found = {}
     if source:
-        loaded = _load_clips(source, None, file_fps, metres_per_unit, up_axis, ground, role)
+        loaded = reading.load(source)
         for k, group in enumerate(loaded.by_skeleton()):
             name = " ".join(source) if k == 0 else f"{' '.join(source)} ({k + 1})"
             found[name] = measure_likeness(concatenate(group))

@@ -10,19 +10,12 @@ import typer
 from rich.table import Table
 
 from kumite.cli.app import JsonOption, Stages, app, out, print_json, progress
-from kumite.cli.motion import (
-    FileFpsOption,
-    FpsOption,
-    GroundOption,
-    RoleOption,
-    ScaleOption,
-    UpOption,
-    _load_clips,
-)
+from kumite.cli.reading import FpsOption, Reading, reads_mocap
 from kumite.errors import KumiteError
 
 
 @app.command()
+@reads_mocap
 def segment(
     source: Annotated[
         list[str] | None,
@@ -41,11 +34,8 @@ def segment(
     ] = False,
     as_json: JsonOption = False,
     fps: FpsOption = None,
-    file_fps: FileFpsOption = None,
-    metres_per_unit: ScaleOption = None,
-    up_axis: UpOption = None,
-    ground: GroundOption = None,
-    role: RoleOption = None,
+    *,
+    reading: Reading,
 ) -> None:
     """Cut clips into actions: a text file to edit. Run it again as often as you like."""
     from kumite.annotate import find_actions, find_avoidance, find_contacts, find_strikes
@@ -68,7 +58,7 @@ def segment(
         if fps is not None and fps != made.clips[0].fps:
             raise KumiteError(f"--fps: a style is at {made.clips[0].fps:g} frames a second")
     else:
-        loaded = _load_clips(source or [], fps, file_fps, metres_per_unit, up_axis, ground, role)
+        loaded = reading.load(source or [], fps)
         groups = loaded.by_skeleton()
     sets = [concatenate(group) for group in groups]
     if known is not None:

@@ -1,0 +1,94 @@
+"""Options that say how motion capture is read, the same of every command that reads it."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+
+import typer
+
+from kumite.cli.app import Stages, progress
+from kumite.errors import KumiteError
+
+if TYPE_CHECKING:
+    from kumite.mocap import Loaded
+
+Source = Annotated[
+    list[str], typer.Argument(help="Mocap: a folder, a glob, .bvh files, .amc files.")
+]
+FpsOption = Annotated[float | None, typer.Option(help="Resample to this rate, frames a second.")]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What the user says of the files: it beats ``kumite.toml``, the files and all inference."""
+
+    file_fps: Annotated[
+        float | None,
+        typer.Option(help="The files' own rate, where they state none or a wrong one."),
+    ] = None
+    metres_per_unit: Annotated[
+        float | None, typer.Option(help="Length of the files' unit in metres (else inferred).")
+    ] = None
+    up_axis: Annotated[
+        str | None, typer.Option(help="Up axis of the files, Y or Z (else inferred).")
+    ] = None
+    ground: Annotated[
+        float | None,
+        typer.Option(help="Height of the floor in the files in metres (else inferred)."),
+    ] = None
+    role: Annotated[
+        list[str] | None,
+        typer.Option("--role", help="ROLE=JOINT, where names say too little; may be repeated."),
+    ] = None
+
+    def given(self) -> list[str]:
+        """The names of the options that were given."""
+        return [
+            f"--{f.name.replace('_', '-')}"
+            for f in fields(self)
+            if getattr(self, f.name) != f.default
+        ]
+
+    def load(self, source: Sequence[str], fps: float | None = None) -> Loaded:
+        """The clips of a source."""
+        from kumite import mocap
+
+        said = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "role"}
+        with progress() as bars:
+            Stages(bars)("reading motion capture")
+            return mocap.load(source, fps=fps, roles=_roles(self.role), **said)
+
+
+def _roles(pairs: Sequence[str] | None) -> dict[str, str]:
+    roles = {}
+    for pair in pairs or []:
+        role, equals, joint = pair.partition("=")
+        if not equals:
+            raise KumiteError(f"--role {pair!r}: expected ROLE=JOINT, such as left_hand=LWrist")
+        roles[role] = joint
+    return roles
+
+
+def reads_mocap(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of :class:`Reading`; it is called with them as ``reading``."""
+    hints = get_type_hints(Reading, include_extras=True)
+    options = [
+        inspect.Parameter(
+            f.name, inspect.Parameter.KEYWORD_ONLY, default=f.default, annotation=hints[f.name]
+        )
+        for f in fields(Reading)
+    ]
+    own = inspect.signature(command, eval_str=True).parameters.values()
+    shown = [*(p.replace(kind=p.KEYWORD_ONLY) for p in own if p.name != "reading"), *options]
+
+    def run(**given: Any) -> None:
+        reading = Reading(**{f.name: given.pop(f.name) for f in fields(Reading)})
+        command(**given, reading=reading)
+
+    run.__name__, run.__doc__, run.__module__ = command.__name__, command.__doc__, __name__
+    run.__annotations__ = {p.name: p.annotation for p in shown}
+    run.__signature__ = inspect.Signature(shown)  # pyright: ignore[reportFunctionMemberAccess]
+    return run
