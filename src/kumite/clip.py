@@ -387,6 +387,28 @@ def check(clip: Clip) -> list[str]:
     return problems
 
 
+def runs(
+    mask: np.ndarray, clip_start: Sequence[int] | np.ndarray | None = None, *, apart: int = 1
+) -> np.ndarray:
+    """Half-open runs [n, 2] int64 of True in mask [F], in order.
+
+    clip_start [C + 1]: of the clips that the frames are of; a run ends where its clip does. Without
+    it all frames are of one clip. apart: runs of one clip with fewer frames between them are one.
+    """
+    mask = np.asarray(mask, dtype=bool)
+    clip_start = np.array([0, len(mask)]) if clip_start is None else np.asarray(clip_start)
+    border = np.zeros(len(mask) + 1, dtype=bool)
+    border[clip_start] = True
+    padded = np.concatenate([[False], mask, [False]])
+    start = np.flatnonzero(mask & (~padded[:-2] | border[:-1]))
+    stop = np.flatnonzero(mask & (~padded[2:] | border[1:])) + 1
+    clip = np.searchsorted(clip_start, start, side="right")
+    new = (start[1:] - stop[:-1] >= apart) | (clip[1:] != clip[:-1])
+    ends = np.ones(min(len(start), 1), dtype=bool)  # the first run begins, the last ends, if any
+    first, last = np.concatenate([ends, new]), np.concatenate([new, ends])
+    return np.stack([start[first], stop[last]], axis=1)
+
+
 def concatenate(clips: Sequence[Clip], fps: float | None = None) -> ClipSet:
     """Clips of one skeleton as a set, resampled to ``fps`` (the lowest rate among them by default).
 

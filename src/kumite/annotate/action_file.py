@@ -55,7 +55,7 @@ from kumite.annotate.action_lines import (
 )
 from kumite.annotate.actions import DIRECTIONS, DIRECTIONS_OF, KINDS, NO_LIMB, Actions
 from kumite.annotate.avoidance import AvoidanceParts
-from kumite.clip import LIMBS, ClipSet
+from kumite.clip import LIMBS, ClipSet, runs
 from kumite.errors import at, unknown
 
 SLIVER = 0.15  # s: less than this left of a line is not an action
@@ -316,7 +316,7 @@ def merge(
         for name, frames in zip(one.names, np.diff(one.clip_start).tolist()):
             old = known.sections.get(name, Section(())) if known else Section(())
             taken = _uncovered(old, frames)
-            gaps = int(np.count_nonzero(np.diff(taken.astype(np.int8), prepend=0) == 1))
+            gaps = len(runs(taken))
             hand = [replace(x, number=None) for x in old.lines if x.by_hand]
             for x in hand:
                 taken[x.start : x.stop] = True
@@ -370,12 +370,12 @@ def _uncovered(section: Section, frames: int) -> np.ndarray:
 def _free_pieces(line: Line, taken: np.ndarray, *, claim: bool = False) -> list[Line]:
     """What is left of a line where other lines have taken frames; claim: take what is left."""
     free = ~taken[line.start : line.stop]
-    edges = np.flatnonzero(np.diff(free.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
+    pieces = runs(free)
     if claim:
         taken[line.start : line.stop] = True
     return [
         replace(line, start=line.start + a, stop=line.start + b, number=None)
-        for a, b in edges.tolist()
+        for a, b in pieces.tolist()
     ]
 
 

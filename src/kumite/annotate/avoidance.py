@@ -31,7 +31,7 @@ from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 from kumite.annotate.actions import KINDS, Actions, find_actions
 from kumite.annotate.contacts import Contacts
 from kumite.annotate.strikes import find_strikes
-from kumite.clip import SIDES, ClipSet, freeze
+from kumite.clip import SIDES, ClipSet, freeze, runs
 from kumite.errors import KumiteError
 from kumite.rotation import planar_apply, planar_inverse
 
@@ -179,7 +179,8 @@ def find_avoidance(
             if b - a < settings.shortest * clips.fps or taken[a:b].any():
                 continue
             found.append((a, b))
-            taken[max(a - around, 0) : b + around] = True
+            first, stop = clips.clip_start[clips.clip_of_frame[a] :][:2]
+            taken[max(a - around, first) : min(b + around, stop)] = True
 
     add(_aside(clips, spans, body, settings), settings.apart)
     add(_aloft(clips, body, settings), settings.apart)
@@ -270,7 +271,7 @@ def _around(out: np.ndarray) -> tuple[int, int]:
 def _low(clips: ClipSet, body: _Body, settings: AvoidanceSettings) -> Iterator[tuple[int, int]]:
     """Dips of the head that end."""
     borders = np.concatenate([clips.clip_start[:-1], clips.clip_start[1:] - 1])
-    for a, b in _runs(body.dip > 0.5 * settings.low):
+    for a, b in runs(body.dip > 0.5 * settings.low, clips.clip_start).tolist():
         depth = float(body.dip[a:b].max())
         ends = not np.any((borders >= a) & (borders < b))
         fallen = depth > settings.lying * body.head[a]
@@ -294,7 +295,8 @@ def _aloft(clips: ClipSet, body: _Body, settings: AvoidanceSettings) -> Iterator
     """Jumps: both feet high at once."""
     lower, higher = body.lift.min(axis=1), body.lift.max(axis=1)
     upright = body.dip < 2 * settings.low  # who crawls has both feet up, too
-    for a, b in _runs((lower > 0.25 * settings.aloft) & upright):
+    high = (lower > 0.25 * settings.aloft) & upright
+    for a, b in runs(high, clips.clip_start).tolist():
         top = float(lower[a:b].max())
         if top < settings.aloft:
             continue
@@ -369,9 +371,3 @@ def _out(
         first, last = _around(out - min(settings.share * farthest, settings.enough))
         if last - first < settings.out_for * fps and not _most(body.attack, a + first, a + last):
             yield a + first, a + last
-
-
-def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
-    """Half-open runs of True."""
-    edges = np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kumite.clip import SIDES, ClipSet, freeze
+from kumite.clip import SIDES, ClipSet, freeze, runs
 from kumite.errors import KumiteError
 
 STANDING_PERCENTILE = 5.0  # of a joint's heights: low, but above the outliers
@@ -37,12 +37,18 @@ class Contacts:
 
 
 def find_contacts(
-    clips: ClipSet, *, height: float = 0.05, speed: float = 0.4, shortest: float = 0.07
+    clips: ClipSet,
+    *,
+    height: float = 0.05,
+    speed: float = 0.4,
+    shortest: float = 0.07,
+    resting_height: np.ndarray | None = None,
 ) -> Contacts:
     """Contacts of every frame.
 
     height: how far above its resting height a joint may be [m]. speed: how fast it may move [m/s].
-    shortest: contacts and gaps shorter than this are noise and are closed [s].
+    shortest: contacts and gaps shorter than this are noise and are closed [s]. resting_height
+    [2, 2] m: see :class:`Contacts`, where it is known; else it is measured, of all clips together.
     """
     if height <= 0 or speed <= 0 or shortest < 0:
         raise KumiteError("contacts: height and speed must be above 0, shortest not below 0")
@@ -55,15 +61,16 @@ def find_contacts(
             if role not in clips.skeleton.roles:
                 role = f"{side}_foot"  # no toe joint: the ankle alone decides
             p = position[:, clips.skeleton.joint(role)]
-            resting[s, r] = np.percentile(p[:, 1], STANDING_PERCENTILE)
+            if resting_height is None:
+                resting[s, r] = np.percentile(p[:, 1], STANDING_PERCENTILE)
+            else:
+                resting[s, r] = resting_height[s, r]
             slow = np.linalg.norm(velocity(p, clips), axis=1) < speed
             on_ground[:, s] |= slow & (p[:, 1] < resting[s, r] + height)
     frames = round(shortest * clips.fps)
-    for start, stop in zip(clips.clip_start[:-1], clips.clip_start[1:]):
-        for s in range(2):
-            part = on_ground[start:stop, s]
-            _drop_short_runs(part, frames, value=False)
-            _drop_short_runs(part, frames, value=True)
+    for s in range(2):
+        for value in (False, True):
+            _flip_short_runs(on_ground[:, s], clips.clip_start, frames, value=value)
     return Contacts(on_ground, resting)
 
 
@@ -76,10 +83,12 @@ def velocity(position: np.ndarray, clips: ClipSet) -> np.ndarray:
     return v
 
 
-def _drop_short_runs(mask: np.ndarray, shortest: int, *, value: bool) -> None:
-    """Runs of ``value`` shorter than ``shortest`` frames are flipped in place, inner runs only."""
-    edges = np.flatnonzero(np.diff(mask)) + 1
-    bounds = np.concatenate([[0], edges, [len(mask)]])
-    for a, b in zip(bounds[:-1], bounds[1:]):
-        if mask[a] == value and b - a < shortest and a > 0 and b < len(mask):
-            mask[a:b] = not value
+def _flip_short_runs(
+    mask: np.ndarray, clip_start: np.ndarray, shortest: int, *, value: bool
+) -> None:
+    """Runs of ``value`` in mask [F] shorter than ``shortest`` frames are flipped in place, but not
+    those at a clip's ends."""
+    found = runs(mask == value, clip_start)
+    short = (found[:, 1] - found[:, 0] < shortest) & ~np.isin(found, clip_start).any(axis=1)
+    for a, b in found[short].tolist():
+        mask[a:b] = not value

@@ -17,7 +17,7 @@ import numpy as np
 
 from kumite.annotate.actions import KINDS, Actions
 from kumite.annotate.contacts import Contacts, velocity
-from kumite.clip import SIDES, ClipSet, forward_kinematics, freeze
+from kumite.clip import SIDES, ClipSet, forward_kinematics, freeze, runs
 from kumite.errors import KumiteError, unknown
 from kumite.rotation import (
     conjugate,
@@ -311,20 +311,17 @@ def _stands(look: _Look, settings: CycleSettings) -> list[tuple[int, int]]:
     still &= look.height >= settings.upright * look.standing
     shortest, longest = (round(s * clips.fps) for s in settings.stand)
     out = []
-    for c in range(len(clips.names)):
-        first, last = (int(f) for f in clips.clip_start[c : c + 2])
-        edges = np.flatnonzero(np.diff(still[first:last].astype(np.int8), prepend=0, append=0))
-        for a, b in (edges.reshape(-1, 2) + first).tolist():
-            best, least = None, np.inf
-            for start in range(a + 1, b - shortest, max(1, shortest // 6)):
-                ends = np.arange(start + shortest, min(start + longest, b - 1) + 1)
-                if len(ends) == 0:
-                    continue
-                gaps = look.gap(start, ends)
-                if gaps.min() < least:
-                    best, least = (start, int(ends[np.argmin(gaps)])), float(gaps.min())
-            if best:
-                out.append(best)
+    for a, b in runs(still, clips.clip_start).tolist():
+        best, least = None, np.inf
+        for start in range(a + 1, b - shortest, max(1, shortest // 6)):
+            ends = np.arange(start + shortest, min(start + longest, b - 1) + 1)
+            if len(ends) == 0:
+                continue
+            gaps = look.gap(start, ends)
+            if gaps.min() < least:
+                best, least = (start, int(ends[np.argmin(gaps)])), float(gaps.min())
+        if best:
+            out.append(best)
     return out
 
 

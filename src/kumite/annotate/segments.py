@@ -25,7 +25,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from kumite.annotate.contacts import Contacts, find_contacts
-from kumite.clip import SIDES, ClipSet
+from kumite.clip import SIDES, ClipSet, runs
 from kumite.rotation import planar_apply, planar_inverse
 
 ROLES = (
@@ -131,7 +131,8 @@ def find_cuts(
     clips: ClipSet, contacts: Contacts, motion: Motion, settings: CutSettings
 ) -> tuple[np.ndarray, np.ndarray]:
     """Frames [P + 1] at which clips are cut, borders included, and why [P + 1] (Cut)."""
-    light = find_contacts(clips, height=LIGHT[0], speed=LIGHT[1]).on_ground
+    resting = contacts.resting_height
+    light = find_contacts(clips, height=LIGHT[0], speed=LIGHT[1], resting_height=resting).on_ground
     frames: list[int] = []
     reasons: list[Cut] = []
     for c in range(len(clips.names)):
@@ -176,23 +177,15 @@ def _rests(
     lying = motion.position[a:b, PELVIS, 1] < LYING * motion.standing[clip]
     near = (motion.away[a:b] < settings.near) & stands & (gone < settings.going)
     resting = (quiet < _limit(quiet, settings)) & (near | lying)
-    runs = _runs(resting)
-    if len(runs) > 1:  # moments too short to be a movement part no rest
-        apart = np.flatnonzero(runs[1:, 0] - runs[:-1, 1] >= round(0.05 * fps))
-        runs = np.stack(
-            [
-                runs[np.concatenate([[0], apart + 1]), 0],
-                runs[np.concatenate([apart, [len(runs) - 1]]), 1],
-            ],
-            axis=1,
-        )
-    return runs[runs[:, 1] - runs[:, 0] >= 0.04 * fps]
+    # moments too short to be a movement part no rest
+    found = runs(resting, apart=round(0.05 * fps))
+    return found[found[:, 1] - found[:, 0] >= 0.04 * fps]
 
 
 def _stands(on_ground: np.ndarray, fps: float, settings: CutSettings) -> np.ndarray:
     """Frames [F] of double support that is more than a gait's, from step to step."""
     both = on_ground[:, 0] & on_ground[:, 1]
-    for a, b in _runs(both).tolist():
+    for a, b in runs(both).tolist():
         if b - a < settings.stand * fps and a > 0 and b < len(both):
             both[a:b] = False
     return both
@@ -243,9 +236,3 @@ def _landings(on_ground: np.ndarray, fps: float) -> np.ndarray:
     down[1:] = (on_ground[1:] & ~on_ground[:-1]).any(axis=1)
     frames = np.flatnonzero(down)
     return frames[np.diff(frames, prepend=-fps) > 0.1 * fps]
-
-
-def _runs(mask: np.ndarray) -> np.ndarray:
-    """Half-open runs [n, 2] of True."""
-    edges = np.diff(mask.astype(np.int8), prepend=0, append=0)
-    return np.flatnonzero(edges).reshape(-1, 2)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kumite.annotate.contacts import velocity
-from kumite.clip import LIMBS, ClipSet, freeze, tip_positions
+from kumite.clip import LIMBS, ClipSet, freeze, runs, tip_positions
 from kumite.errors import KumiteError
 from kumite.rotation import planar_apply, planar_inverse
 
@@ -114,7 +114,8 @@ def find_strikes(
             elbow, wrist = (position[:, skeleton.joint(f"{side}_{r}")] for r in ("forearm", "hand"))
             speed[:, k] = _along(v, wrist, elbow)
             effective[:, k] = (speed[:, k] > hand_speed) & (point[:, 1] > FLOOR)
-        for a, b in _runs(effective[:, k], clips.clip_start, round(APART * clips.fps)):
+        apart = round(APART * clips.fps)
+        for a, b in runs(effective[:, k], clips.clip_start, apart=apart).tolist():
             peak = a + int(np.argmax(speed[a:b, k]))
             rows.append((peak, a, b, k, planar_apply(turn[peak], v[peak])))
     rows.sort(key=lambda r: (r[0], r[3]))
@@ -132,19 +133,3 @@ def _along(v: np.ndarray, end: np.ndarray, start: np.ndarray) -> np.ndarray:
     """The part [F] of velocities [F, 3] along the way from start to end [F, 3]."""
     axis = end - start
     return np.sum(v * axis, axis=1) / np.maximum(np.linalg.norm(axis, axis=1), 1e-9)
-
-
-def _runs(mask: np.ndarray, clip_start: np.ndarray, apart: int) -> list[tuple[int, int]]:
-    """Half-open runs of True, cut at clip borders; those less than ``apart`` frames apart join."""
-    cut = np.zeros(len(mask) + 1, dtype=bool)
-    cut[clip_start] = True
-    padded = np.concatenate([[False], mask, [False]])
-    start = np.flatnonzero(padded[1:-1] & (~padded[:-2] | cut[:-1]))
-    stop = np.flatnonzero(padded[1:-1] & (~padded[2:] | cut[1:])) + 1
-    clip = np.searchsorted(clip_start, start, side="right")
-    new = (start[1:] - stop[:-1] >= apart) | (clip[1:] != clip[:-1])
-    ends = np.ones(
-        min(len(start), 1), dtype=bool
-    )  # the first run begins, the last one ends, if any
-    first, last = np.concatenate([ends, new]), np.concatenate([new, ends])
-    return list(zip(start[first].tolist(), stop[last].tolist()))

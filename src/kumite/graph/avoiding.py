@@ -101,31 +101,46 @@ def find_avoiding_transitions(
     # Whoever has begun to avoid goes through with it: else paths that begin again and again, and
     # never do, would be most of all.
     entry, part_of_entry = _entries(clips, parts, inside, round(LEAD * fps))
+    if len(entry) == 0:
+        raise KumiteError(
+            f"each of {len(parts)} avoidance part(s) begins with its clip: no frame leads into "
+            "one; expected clips that begin before someone avoids something"
+        )
     begun = inside.copy()
     begun[entry[entry < parts.start[part_of_entry]]] = True
     may_leave = ~begun & (since > 0)
     if strikes is not None:  # and whoever has begun to strike
         for start, stop in zip(strikes.start.tolist(), strikes.stop.tolist()):
-            may_leave[max(start - round(COMMITTED * fps), 0) : stop] = False
+            first = clips.clip_start[clip[start]]
+            may_leave[max(start - round(COMMITTED * fps), first) : stop] = False
     leaving = np.flatnonzero(may_leave & ((since % step == 0) | ends | _lasts(parts, len(clips))))
+    if len(leaving) == 0:
+        raise KumiteError(
+            f"too few frames for a graph: of {len(clips)} in {len(clips.names)} clip(s) none is "
+            "outside of the avoidance parts"
+        )
     # Where the capture goes on into an avoidance there must be another way, too.
     into = np.zeros(len(clips), dtype=bool)
     before = np.searchsorted(leaving, parts.start) - 1
-    into[leaving[before[before >= 0]]] = True
+    same = (before >= 0) & (clip[leaving[before]] == clip[parts.start])
+    into[leaving[before[same]]] = True
     changing = np.flatnonzero(may_leave & ((since % change == 0) | ends | into))
     # From i the capture goes on with j where i is like j - 1; a part's own frames go on anyway.
     d = _between(features, leaving, entry - 1)
     own = (entry[None] > leaving[:, None]) & (entry[None] - leaving[:, None] <= step)
     d[own & (clip[leaving][:, None] == clip[entry][None])] = np.inf
     order = np.argsort(part_of_entry, kind="stable")
-    first = np.searchsorted(part_of_entry[order], np.arange(len(parts)))
-    best = np.minimum.reduceat(d[:, order], first, axis=1)  # [S, P]
+    first = np.searchsorted(part_of_entry[order], np.arange(len(parts) + 1))
+    best = np.full((len(leaving), len(parts)), np.inf, dtype=np.float32)  # [S, P]
+    # Nothing enters a part that begins with its clip: there is no frame before it.
+    open_ = np.flatnonzero(np.diff(first))
+    best[:, open_] = np.minimum.reduceat(d[:, order], first[open_], axis=1)
     unlike = _signatures(clips, parts)
     source, target, cost = [], [], []
     sooner = round(SOONER * fps)
     for row, i in enumerate(leaving):
         for p in _choose(best[row], unlike, offered, worst):
-            mine = order[first[p] : first[p + 1] if p + 1 < len(parts) else None]
+            mine = order[first[p] : first[p + 1]]
             fits = mine[np.argmin(d[row, mine])]
             late = mine[(d[row, mine] <= worst) & (entry[mine] >= entry[fits] + sooner)]
             # Where it fits best, and where it is over soonest.
@@ -152,7 +167,7 @@ def find_avoiding_transitions(
             cost.append(float(d[row, j]))
             left -= 1
     if strikes is not None and len(strikes):
-        recovers = leaving[_just_after(parts, leaving, round(RECOVERY * fps))]
+        recovers = leaving[_just_after(parts, leaving, clip, round(RECOVERY * fps))]
         for i, j, c in _strike_back(clips, strikes, features, recovers, begun, worst):
             source.append(i), target.append(j), cost.append(c)
     pairs, keep = np.unique(np.stack([source, target], axis=1), axis=0, return_index=True)
@@ -192,11 +207,14 @@ def _entries(
     return np.array(entry, dtype=np.int64), np.array(whose, dtype=np.int64)
 
 
-def _just_after(parts: AvoidanceParts, frames: np.ndarray, within: int) -> np.ndarray:
-    """Which frames [S] bool follow the end of a part by up to so many."""
+def _just_after(
+    parts: AvoidanceParts, frames: np.ndarray, clip: np.ndarray, within: int
+) -> np.ndarray:
+    """Which frames [S] bool follow the end of a part by up to so many. clip [F]: of each frame."""
     last = parts.stop - 1
     since = np.searchsorted(last, frames, side="right") - 1
-    return (since >= 0) & (frames - last[np.maximum(since, 0)] <= within)
+    part = last[np.maximum(since, 0)]
+    return (since >= 0) & (clip[frames] == clip[part]) & (frames - part <= within)
 
 
 def _strike_back(

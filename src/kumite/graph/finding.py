@@ -25,7 +25,7 @@ from kumite.annotate import (
 )
 from kumite.annotate.kinds import strike_directions
 from kumite.body import lay_body
-from kumite.clip import LIMBS, SIDES, ClipSet
+from kumite.clip import LIMBS, SIDES, ClipSet, runs
 from kumite.errors import KumiteError
 from kumite.graph.distance import pose_features
 from kumite.graph.hierarchy import Targets, pose_distances
@@ -77,7 +77,8 @@ def find_targets(
     near, far = round(NEAR * clips.fps), round(FAR * clips.fps)
     goes = np.ones(len(clips), dtype=bool)
     for a, b, _ in hearts:
-        goes[max(a - near, 0) : b + near + 1] = False
+        first, stop = clips.clip_start[clips.clip_of_frame[a] :][:2]
+        goes[max(a - near, first) : min(b + near + 1, stop)] = False
     cycles = find_cycles(clips, contacts, where=goes)
     away, edges, clip = _away(clips, cycles), clips.clip_start, clips.clip_of_frame
     balance = find_balance(clips, contacts)
@@ -140,10 +141,11 @@ def _hearts(clips: ClipSet, contacts: Contacts, strikes: Strikes) -> list[tuple[
     begins. Blows near a departure are part of it: arms swing in a jump, and hands support.
     """
     departs, apart = _departures(clips, contacts), round(TOGETHER * clips.fps)
+    clip = clips.clip_of_frame
     blows = [
         (a, b)
         for a, b in _blows(clips, strikes)
-        if not any(a <= q + apart and p - apart <= b for p, q in departs)
+        if not any(a <= q + apart and p - apart <= b and clip[p] == clip[a] for p, q in departs)
     ]
     more = round(CROUCH * clips.fps)
     return sorted([(a, b, more) for a, b in departs] + [(a, b, 0) for a, b in blows])
@@ -157,15 +159,14 @@ def _departures(clips: ClipSet, contacts: Contacts) -> list[tuple[int, int]]:
     feet = [skeleton.joint(f"{side}_foot") for side in SIDES]
     parts = [[f, skeleton.roles.get(f"{side}_toe", f)] for f, side in zip(feet, SIDES)]
     lifted = (position[:, parts, 1] - contacts.resting_height).min(axis=(1, 2))
-    out = []
+    departed = lifted > HIGH
     for first, stop in zip(clips.clip_start[:-1].tolist(), clips.clip_start[1:].tolist()):
         h = gaussian_filter1d(height[first:stop], SMOOTH * clips.fps, mode="nearest")
-        runs = _runs((h < LOW) | (lifted[first:stop] > HIGH), round(TOGETHER * clips.fps))
-        for a, b in runs:
-            inside = a > 0 and b < len(h) - 1 and b - a <= LONGEST * clips.fps
-            if inside:
-                out.append((first + a, first + b))
-    return out
+        departed[first:stop] |= h < LOW
+    found = runs(departed, clips.clip_start, apart=round(TOGETHER * clips.fps))
+    at_border = np.isin(found, clips.clip_start).any(axis=1)
+    short = found[:, 1] - 1 - found[:, 0] <= LONGEST * clips.fps
+    return [(a, b - 1) for a, b in found[short & ~at_border].tolist()]
 
 
 def _blows(clips: ClipSet, strikes: Strikes) -> list[tuple[int, int]]:
@@ -176,20 +177,8 @@ def _blows(clips: ClipSet, strikes: Strikes) -> list[tuple[int, int]]:
     struck = np.zeros(len(clips), dtype=bool)
     for x in np.flatnonzero(fast).tolist():
         struck[strikes.start[x] : strikes.stop[x]] = True
-    out = []
-    for first, stop in zip(clips.clip_start[:-1].tolist(), clips.clip_start[1:].tolist()):
-        runs = _runs(struck[first:stop], round(TOGETHER * clips.fps))
-        out += [(first + a, first + b) for a, b in runs]
-    return out
-
-
-def _runs(mask: np.ndarray, apart: int) -> list[tuple[int, int]]:
-    """First and last frames of runs of True; runs no more than ``apart`` frames apart are one."""
-    at = np.flatnonzero(mask)
-    if len(at) == 0:
-        return []
-    cut = np.flatnonzero(np.diff(at) > apart)
-    return list(zip(at[np.append(0, cut + 1)].tolist(), at[np.append(cut, len(at) - 1)].tolist()))
+    found = runs(struck, clips.clip_start, apart=round(TOGETHER * clips.fps))
+    return [(a, b - 1) for a, b in found.tolist()]
 
 
 def _away(clips: ClipSet, cycles: Cycles) -> np.ndarray:

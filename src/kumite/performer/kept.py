@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kumite import files
-from kumite.clip import Clip
+from kumite.clip import Clip, runs
 from kumite.errors import KumiteError
 from kumite.performer.perform import Performance, perform
 from kumite.performer.skeleton import skeleton
@@ -43,8 +43,7 @@ def truth_to_json(truth: Truth) -> dict[str, Any]:
     """Strikes, actions and contacts (as runs of frames) of a clip, for a file of its own."""
     contacts = {}
     for s, side in enumerate(("left", "right")):
-        edges = np.flatnonzero(np.diff(truth.on_ground[:, s], prepend=False, append=False))
-        contacts[side] = edges.reshape(-1, 2).tolist()
+        contacts[side] = runs(truth.on_ground[:, s]).tolist()
     return {"contacts": contacts, **_events(truth)}
 
 
