@@ -13,7 +13,15 @@ from kumite import files
 from kumite.annotate import Contacts, find_contacts, find_strikes
 from kumite.clip import Clip, concatenate
 from kumite.errors import KumiteError
-from kumite.graph import Library, Transitions, build_library, fold, load_library, save_library
+from kumite.graph import (
+    Library,
+    Transitions,
+    build_library,
+    find_transitions,
+    fold,
+    load_library,
+    save_library,
+)
 from kumite.graph import strongest_component as component
 from kumite.graph.library import VERSION
 from kumite.rotation import planar_apply, planar_compose, planar_inverse
@@ -173,6 +181,31 @@ def test_notes_of_one_clip_do_not_leak_into_the_next():
     clips = concatenate([a, far])
     assert len(find_strikes(clips)) == 0  # the step from clip to clip is no blow
     assert find_contacts(clips).on_ground.all()
+
+
+@pytest.mark.parametrize("event", ["left", "both"])
+def test_a_graph_of_many_frames_is_made_by_the_same_rules(
+    library: Library, monkeypatch: pytest.MonkeyPatch, event: str
+):
+    """Of many lift-offs only the nearest pairs are kept in memory: shares are of all pairs."""
+    takes = list(library.clips)
+    found = []
+    for count in (len(takes) // 4, len(takes) // 2, len(takes)):
+        clips = concatenate(takes[:count])
+        contacts = find_contacts(clips)
+        plain = find_transitions(clips, contacts, event=event, per_second=200.0)
+        with monkeypatch.context() as m:
+            m.setattr("kumite.graph.transitions._MANY", 20)
+            of_many = find_transitions(clips, contacts, event=event, per_second=200.0)
+        for name in ("source", "target", "cost"):
+            assert np.array_equal(getattr(plain, name), getattr(of_many, name)), name
+        assert (plain.candidates, plain.threshold) == (of_many.candidates, of_many.threshold)
+        off = contacts.lift_off(clips.clip_start)
+        ways = sum(int(n) * (int(n) - 1) for n in off[:, : 2 if event == "both" else 1].sum(axis=0))
+        assert len(plain) >= min(round(200.0 * clips.seconds), round(0.2 * plain.candidates))
+        assert plain.candidates <= ways  # of both feet at once one counts
+        found.append(len(plain))
+    assert found == sorted(set(found))
 
 
 @pytest.mark.slow

@@ -16,10 +16,9 @@ import numpy as np
 from kumite.annotate import AvoidanceParts, Strikes, find_contacts, find_strikes
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError
-from kumite.graph.distance import PoseFeatures, pose_features
+from kumite.graph.distance import PoseFeatures, pose_features, squared_distances
 from kumite.graph.library import Library, chosen_parts, folded, with_parts
 from kumite.graph.transitions import Transitions
-from kumite.kernels import distance as kernels
 from kumite.rotation import planar_apply, planar_compose, planar_inverse
 
 EVERY = 0.20  # s between the frames from which an avoidance may be begun
@@ -37,7 +36,6 @@ COMMITTED = 0.36  # … and from which on it is gone through with
 BLOWS = 6  # offered at such a frame, at most
 SAME_PLACE = 0.10  # m: blows that land nearer to each other than that are alike
 ROLES = ("head", "chest", "pelvis", "left_hand", "right_hand", "left_foot", "right_foot")
-_SPARE = 8  # rows that the kernel may write beyond the last
 
 
 def build_avoidance_library(
@@ -263,11 +261,7 @@ def _strike_back(
 
 def _between(features: PoseFeatures, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Root of D [R, C] float32 rad between frames."""
-    frames = np.concatenate([rows, columns])
-    out = np.empty((len(rows) + _SPARE, len(frames)), dtype=np.float32)
-    of = features.take(frames)
-    kernels.distance_rows(of.quaternion, of.weight, of.euclidean, 0, len(rows), out)
-    return np.sqrt(np.maximum(out[: len(rows), len(rows) :], 0.0))
+    return np.sqrt(np.maximum(squared_distances(features, rows, columns), 0.0))
 
 
 def _signatures(clips: ClipSet, parts: AvoidanceParts) -> np.ndarray:

@@ -12,6 +12,7 @@ from types import MappingProxyType
 import numpy as np
 
 from kumite.clip import ClipSet
+from kumite.kernels import distance as kernels
 from kumite.rotation import conjugate, from_yaw, log, multiply, planar_apply
 
 JOINT_WEIGHTS = MappingProxyType(
@@ -100,3 +101,11 @@ def pose_features(clips: ClipSet) -> PoseFeatures:
         weight[used].astype(np.float32),
         np.ascontiguousarray(np.concatenate(parts), dtype=np.float32),
     )
+
+
+def squared_distances(features: PoseFeatures, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """D [R, C] float32 rad² between poses, given by their numbers."""
+    of = features.take(np.concatenate([rows, columns]))
+    out = np.empty((len(rows) + kernels.LANES, len(rows) + len(columns)), dtype=np.float32)
+    kernels.distance_rows(of.quaternion, of.weight, of.euclidean, 0, len(rows), out)
+    return out[: len(rows), len(rows) :]

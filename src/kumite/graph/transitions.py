@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from kumite.annotate import AvoidanceParts, Contacts
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError, unknown
-from kumite.graph.distance import PoseFeatures, pose_features
+from kumite.graph.distance import PoseFeatures, pose_features, squared_distances
 from kumite.kernels import distance as kernels
 
 EVENTS = {"left": (0,), "right": (1,), "both": (0, 1), "none": ()}
@@ -25,6 +25,7 @@ LARGEST_SHARE = 0.2  # of the pairs at an event: the paper's share is 0.14
 FEWEST = 3  # ways in and out that a rare pose keeps at an event …
 STRETCH_LIMIT = 1.7  # … if they cost no more than this times the threshold
 LEAST_LIMIT, MOST_LIMIT = 1e-3, 1e3  # rad²; what a second guess begins with, and where it ends
+_MANY = 4000  # frames from which on only the best local minima are kept, by a guess of a limit
 _ROOM = 4096  # first guess of local minima a task
 
 
@@ -36,7 +37,7 @@ class Transitions:
     target: np.ndarray  # [X] int32, j
     cost: np.ndarray  # [X] float32, root of D(i, j - 1): about radians
     threshold: float  # the largest cost accepted of any pose, rare ones apart
-    candidates: int  # pairs that met the contact condition (or local minima without one)
+    candidates: int  # pairs that meet the contact condition (without one, local minima looked at)
 
     def __len__(self) -> int:
         return len(self.source)
@@ -76,38 +77,62 @@ def find_transitions(
     joined = np.zeros(len(frames), dtype=bool)
     joined[1:] = (np.diff(frames) == 1) & (np.diff(clips.clip_of_frame[frames]) == 0)
     wanted = max(1, round(min(per_second * clips.seconds, float(len(clips)) ** 2)))
-    a, b, d = _local_minima(features.take(frames), joined, group, wanted)
-    candidates = len(d)
+    at_event = features.take(frames)
     if event != "none":
+        # One foot lifts off at no two frames in a row: nothing competes, and all pairs count. They
+        # are counted here, for where there are many not all of them are kept.
+        candidates = int(sum(n * (n - 1) for n in np.unique(group, return_counts=True)[1].tolist()))
         wanted = min(wanted, max(1, round(largest_share * candidates)))
+    a, b, d = _local_minima(at_event, joined, group, wanted)
+    if event == "none":
+        candidates = len(d)
     order = np.argsort(d, kind="stable")
-    keep = order[:wanted]
-    if event != "none" and len(keep):
+    order = order[:wanted]
+    if len(order) == 0:
+        raise KumiteError("too few frames for a graph: no two poses are alike")
+    a, b, d = a[order], b[order], d[order]
+    worst = d[-1]
+    if event != "none":
         # A rare pose (a deep duck, a far punch) is unlike most others and would be lost: its few
         # best ways in and out are kept, within reason.
-        near = d[order] < STRETCH_LIMIT**2 * d[keep[-1]]
-        few = near & ((_rank(a[order]) < FEWEST) | (_rank(b[order]) < FEWEST))
-        keep = np.union1d(keep, order[few])
-    keep = keep[np.lexsort((b[keep], a[keep]))]
-    if len(keep) == 0:
-        raise KumiteError("too few frames for a graph: no two poses are alike")
-    cost = np.sqrt(d[keep]).astype(np.float32)
+        ways = np.bincount(a, minlength=len(frames)), np.bincount(b, minlength=len(frames))
+        rare = np.flatnonzero(np.minimum(*ways) < FEWEST)
+        more = _few_best(at_event, group, rare, np.float32(STRETCH_LIMIT**2) * worst)
+        a, b, d = (np.concatenate(both) for both in zip((a, b, d), more))
+    # A pair that is found twice has the same distance, bit by bit.
+    _, keep = np.unique(a.astype(np.int64) * len(frames) + b, return_index=True)
+    a, b, d = a[keep], b[keep], d[keep]
     return Transitions(
-        frames[a[keep]].astype(np.int32),
-        (frames[b[keep]] + 1).astype(np.int32),
-        cost,
-        float(np.sqrt(d[order[min(wanted, len(order)) - 1]])),
+        frames[a].astype(np.int32),
+        (frames[b] + 1).astype(np.int32),
+        np.sqrt(d).astype(np.float32),
+        float(np.sqrt(worst)),
         candidates,
     )
 
 
-def _rank(key: np.ndarray) -> np.ndarray:
-    """How many equal keys come before each [P]."""
-    order = np.argsort(key, kind="stable")
-    first = np.searchsorted(key[order], key[order])
-    rank = np.empty(len(key), dtype=np.int64)
-    rank[order] = np.arange(len(key)) - first
-    return rank
+def _few_best(
+    features: PoseFeatures, group: np.ndarray, rare: np.ndarray, limit: np.float32
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The ``FEWEST`` best pairs (a, b, D) below a limit out of and into each of the rare poses."""
+    source, target, cost = [], [], []
+    for first in range(0, len(rare), kernels.ROWS):
+        rows = rare[first : first + kernels.ROWS]
+        d = squared_distances(features, rows, np.arange(len(group)))
+        d[group[rows][:, None] != group[None]] = np.inf
+        d[np.arange(len(rows)), rows] = np.inf
+        best = np.argsort(d, axis=1, kind="stable")[:, :FEWEST]
+        near = np.take_along_axis(d, best, axis=1)
+        row, k = np.nonzero(near < limit)
+        one, other, apart = rows[row], best[row, k], near[row, k]
+        # D is symmetric: who is best left for is best come from.
+        source += [one, other]
+        target += [other, one]
+        cost += [apart, apart]
+    if not source:
+        nothing = np.zeros(0, dtype=np.int64)
+        return nothing, nothing, np.zeros(0, dtype=np.float32)
+    return np.concatenate(source), np.concatenate(target), np.concatenate(cost)
 
 
 def _candidate_frames(
@@ -134,7 +159,7 @@ def _local_minima(
     count = features.quaternion.shape[2]
     tasks = (count + kernels.ROWS - 1) // kernels.ROWS
     limit = np.float32(np.inf)
-    if count > 4000:
+    if count > _MANY:
         limit = _limit_from_sample(features, wanted)
     room = _ROOM
     while True:
