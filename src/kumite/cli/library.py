@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from kumite.cli.app import out, print_json
 from kumite.errors import KumiteError
@@ -19,14 +18,20 @@ ENDING = ".kumite"
 
 def is_library(source: Path | str) -> bool:
     """Whether a name is that of a library: by what the file says of itself, or by its ending."""
+    if str(source).endswith(ENDING):
+        return True
+    if not os.path.isfile(source):  # noqa: PTH113 - Path.is_file raises on names that are too long
+        return False
     from kumite import files
     from kumite.graph.library import KIND
 
-    return files.kind_of(source) == KIND or str(source).endswith(ENDING)
+    return files.kind_of(source) == KIND
 
 
 def library_values(library: Library) -> dict[str, Any]:
     """What a library holds, as JSON values: how it was built, then what is counted here."""
+    import numpy as np
+
     clips = library.clips
     values = {
         "level": "frames" if library.actions is None else "actions",
@@ -48,6 +53,8 @@ def library_values(library: Library) -> dict[str, Any]:
 
 def library_lines(library: Library) -> list[str]:
     """What a library holds, to be read."""
+    import numpy as np
+
     from kumite.annotate import KINDS
 
     r, clips, table = library.report, library.clips, library.table
@@ -98,6 +105,8 @@ def library_lines(library: Library) -> list[str]:
 
 def _preparation_lines(library: Library) -> list[str]:
     """Cores with the pace of each, then a target a line: what it is about, and where."""
+    import numpy as np
+
     from kumite.clip import LIMBS
     from kumite.graph.preparing import KINDS, NO_LIMB
 

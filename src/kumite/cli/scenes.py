@@ -13,6 +13,7 @@ from rich.table import Table
 from kumite.cli.app import JsonOption, Stages, Training, app, out, print_json, progress
 from kumite.cli.library import is_library
 from kumite.errors import KumiteError, unknown
+from kumite.scene import catalogue
 
 LibraryOption = Annotated[
     Path | None,
@@ -25,14 +26,13 @@ LibraryOption = Annotated[
 @app.command()
 def scenes(as_json: JsonOption = False) -> None:
     """The built-in scenes."""
-    from kumite.scene import builtin_scenes
-
-    found = builtin_scenes()
     if as_json:
-        print_json({name: s.model_dump(mode="json") for name, s in found.items()})
+        from kumite.scene import builtin_scenes
+
+        print_json({name: s.model_dump(mode="json") for name, s in builtin_scenes().items()})
         return
-    for name, settings in found.items():
-        out.print(f"{name:12} {settings.about}", markup=False, highlight=False)
+    for name in catalogue.names():
+        out.print(f"{name:12} {catalogue.about(name)}", markup=False, highlight=False)
 
 
 CountOption = Annotated[
@@ -47,6 +47,7 @@ ThrowsOption = Annotated[
 
 def _settings(scene: str, count: int | None, throws: int | None) -> Any:
     """The scene as it is to be run."""
+    catalogue.find(scene)  # an unknown name is said before anything heavy is imported
     from kumite.scene import load_scene, with_count, with_throws
 
     settings = load_scene(scene)
@@ -116,11 +117,11 @@ def run(
     as_json: JsonOption = False,
 ) -> None:
     """Run a scene without drawing, record it, and print how good it is."""
+    for path in output or []:  # before any long work: what is wrong is said at once
+        _exporter(path)
+    settings = _settings(scene, count, throws)
     from kumite.scene import measure, record
 
-    settings = _settings(
-        scene, count, throws
-    )  # before any long work: what is wrong is said at once
     everyone = (
         settings.model_copy(update={"crowd": None}).names if settings.crowd else settings.names
     )
@@ -277,6 +278,8 @@ def export(
     ] = None,
 ) -> None:
     """Write a recording as GLB (all characters), BVH (one of them) or a contact sheet."""
+    for path in output:
+        _exporter(path)  # a wrong ending is said before anything heavy is imported
     from kumite.scene import load_recording
 
     loaded = load_recording(recording)
@@ -310,8 +313,6 @@ def studio(
     browser: Annotated[bool, typer.Option(help="Open a browser where there is one.")] = True,
 ) -> None:
     """Watch a scene live in the browser, play a recording, or a library's actions one by one."""
-    from kumite.studio import serve
-
     if seconds is None and os.environ.get("DEMO_SECONDS"):
         try:
             seconds = float(os.environ["DEMO_SECONDS"])
@@ -319,8 +320,11 @@ def studio(
             raise KumiteError(
                 f"DEMO_SECONDS={os.environ['DEMO_SECONDS']!r}: expected a number of seconds"
             ) from None
+    stage = _stage(scene, library, count, throws, seed)
+    from kumite.studio import serve
+
     serve(
-        _stage(scene, library, count, throws, seed),
+        stage,
         host=host,
         port=8080 if port is None else port,
         strict_port=port is not None,
@@ -334,13 +338,13 @@ def _stage(
     scene: str, library: Path | None, count: int | None, throws: int | None, seed: int
 ) -> Any:
     """What the studio is to show."""
+    if not scene.endswith(".rec") and not is_library(scene):
+        return _live_scene(_settings(scene, count, throws), library, seed)
     from kumite.graph import load_library
     from kumite.scene import ActionPlayback, Playback, load_recording
 
     if scene.endswith(".rec"):
         return Playback(load_recording(scene))
-    if not is_library(scene):
-        return _live_scene(_settings(scene, count, throws), library, seed)
     for name, value in (("--library", library), ("--count", count), ("--throws", throws)):
         if value is not None:
             raise KumiteError(f"{name}: of a scene; {scene} is a library, whose actions are played")

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from math import radians
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
 from kumite.cli.app import JsonOption, Stages, app, err, log_line, out, print_json, progress
@@ -57,7 +57,7 @@ def train(
         refuse_unwritable(plot)  # before the work, not after
     settings = PreparationSettings() if printed else gradual()
     folder = cache_folder(library)
-    turns = STEER if steer is None else tuple(np.radians(steer).tolist())
+    turns = STEER if steer is None else tuple(map(radians, steer))
     done = 0
     with progress() as bars:
         stages = Stages(bars)

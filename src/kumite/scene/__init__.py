@@ -1,39 +1,5 @@
 """Scenes: characters, objects and events; live, recorded and measured."""
 
-from kumite.scene.actions import ActionPlayback, action_recording
-from kumite.scene.bout import BoutScene
-from kumite.scene.dodge import DodgeScene
-from kumite.scene.evasion import EvasionScene
-from kumite.scene.live import LiveScene
-from kumite.scene.metrics import CharacterMetrics, Metrics, measure
-from kumite.scene.prepare import PrepareScene
-from kumite.scene.recording import Event, Recording, load_recording, save_recording
-from kumite.scene.run import record
-from kumite.scene.settings import SceneSettings, builtin_scenes, load_scene, with_count, with_throws
-from kumite.scene.stage import Playback, SceneObject, Stage
+from kumite.lazy import names_of
 
-__all__ = [
-    "ActionPlayback",
-    "BoutScene",
-    "CharacterMetrics",
-    "DodgeScene",
-    "EvasionScene",
-    "Event",
-    "LiveScene",
-    "Metrics",
-    "Playback",
-    "PrepareScene",
-    "Recording",
-    "SceneObject",
-    "SceneSettings",
-    "Stage",
-    "action_recording",
-    "builtin_scenes",
-    "load_recording",
-    "load_scene",
-    "measure",
-    "record",
-    "save_recording",
-    "with_count",
-    "with_throws",
-]
+__getattr__, __dir__, __all__ = names_of(__name__, __file__)

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import difflib
-import os
 from collections import Counter
 from functools import cached_property
-from importlib import resources
 from math import hypot
-from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field, model_validator
 
 from kumite import toml
 from kumite.errors import KumiteError
+from kumite.scene import catalogue
 from kumite.scene.attackers import AttackerSettings
 from kumite.scene.balls import BallsSettings
 from kumite.scene.dodge import DodgerSettings, DodgersSettings, DodgeSettings
@@ -373,12 +370,7 @@ def with_throws(settings: SceneSettings, throws: int) -> SceneSettings:
 
 def builtin_scenes() -> dict[str, SceneSettings]:
     """The scenes that come with Kumite, by name."""
-    folder = resources.files("kumite.scene") / "builtin"
-    files = sorted((f for f in folder.iterdir() if f.name.endswith(".toml")), key=lambda f: f.name)
-    return {
-        f.name.removesuffix(".toml"): toml.parse(f.read_text("utf-8"), f.name, SceneSettings)
-        for f in files
-    }
+    return {name: load_scene(name) for name in catalogue.names()}
 
 
 def load_scene(name: str) -> SceneSettings:
@@ -387,21 +379,5 @@ def load_scene(name: str) -> SceneSettings:
     Errors: an unknown name (near ones are suggested), a file that is missing, no TOML, or holds a
     wrong key or value (each named, all at once).
     """
-    scenes = builtin_scenes()
-    if name in scenes:
-        return scenes[name]
-    path = Path(name)
-    # Not Path.exists, which raises on a name that is too long for the system.
-    if path.suffix == ".toml" or os.path.exists(name):  # noqa: PTH110
-        try:
-            text = path.read_text("utf-8")
-        except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or "not UTF-8 text; expected a TOML file"
-            raise KumiteError(f"{name}: cannot be read ({reason})") from None
-        return toml.parse(text, name, SceneSettings)
-    near = difflib.get_close_matches(name, scenes, n=2, cutoff=0.4)
-    hint = f"did you mean {' or '.join(near)}? " if near else ""
-    raise KumiteError(
-        f"unknown scene {name!r}: {hint}expected one of {', '.join(sorted(scenes))}, "
-        "or the path of a .toml scene file"
-    )
+    text, where = catalogue.find(name)
+    return toml.parse(text, where, SceneSettings)

@@ -1,0 +1,69 @@
+"""What must not keep a user waiting, and what an installation holds."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+from kumite.scene import catalogue, load_scene, settings
+
+ROOT = Path(__file__).parents[1]
+
+# Each ends before anything has to be computed.
+QUICK = [
+    (["--help"], 0),
+    (["--version"], 0),
+    (["run", "--help"], 0),
+    (["scenes"], 0),
+    (["run", "sparing"], 2),
+    (["run", "sparring", "--out", "fight.foo"], 2),
+    (["studio", "sparing"], 2),
+    (["export", "fight.rec", "-o", "fight.foo"], 2),
+]
+
+
+def test_what_computes_nothing_imports_no_compiler(tmp_path: Path):
+    program = f"""
+import sys
+from kumite import cli
+for command, expected in {QUICK!r}:
+    sys.argv = ["kumite", *command]
+    try:
+        cli.main()
+        status = 0
+    except SystemExit as end:
+        status = end.code or 0
+    assert status == expected, (command, status)
+    heavy = {{"numba", "scipy", "numpy", "matplotlib", "viser"}} & set(sys.modules)
+    assert not heavy, (command, heavy)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    assert "sparring" in done.stdout and "unknown scene 'sparing'" in done.stderr
+
+
+def test_a_scene_reads_its_own_file_only(monkeypatch):
+    read: list[str] = []
+    parse = settings.toml.parse
+
+    def parsed(text: str, where: str, model):
+        read.append(where)
+        return parse(text, where, model)
+
+    monkeypatch.setattr(settings.toml, "parse", parsed)
+    assert load_scene("sparring").about == catalogue.about("sparring")
+    assert read == ["sparring.toml"]
+
+
+def test_what_is_installed_is_what_the_project_asks_for():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    run = [*project["dependencies"], *extras["physics"]]
+    for wanted, file in ((run, "run.txt"), ([*run, *extras["dev"]], "dev.txt")):
+        lines = (ROOT / "requirements" / file).read_text("utf-8").splitlines()
+        locked = {line.split("==")[0] for line in lines if "==" in line}
+        assert {name.split(">=")[0] for name in wanted} <= locked, file
