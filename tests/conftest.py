@@ -8,9 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from kumite import cli
+from kumite import caches, cli
 from kumite import mocap as mocap_files
 from kumite.graph import Library, build_library, builtin_library
+
+# Tests that make libraries and policies anew, in a cache folder of their own, share compiled code.
+os.environ.setdefault("NUMBA_CACHE_DIR", str(caches.compiled() or ""))
 
 
 @pytest.fixture(scope="session")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import tomllib
 from pathlib import Path
 
+import kumite
 from kumite.scene import catalogue, load_scene, settings
 
 ROOT = Path(__file__).parents[1]
@@ -67,3 +69,40 @@ def test_what_is_installed_is_what_the_project_asks_for():
         lines = (ROOT / "requirements" / file).read_text("utf-8").splitlines()
         locked = {line.split("==")[0] for line in lines if "==" in line}
         assert {name.split(">=")[0] for name in wanted} <= locked, file
+
+
+KEPT = """
+from kumite import caches
+from kumite.kernels import pose
+import numpy as np
+out = np.zeros(4)
+pose.quaternion_product(np.array([1.0, 0, 0, 0]), np.array([0.0, 1, 0, 0]), out)
+print(out.tolist(), sum(pose.quaternion_product.stats.cache_hits.values()), caches.root())
+"""
+
+
+def _kept(**environment: str | None) -> tuple[list[str], str]:
+    given = {**os.environ, "PYTHONPATH": str(Path(kumite.__file__).parents[1]), **environment}
+    given = {name: value for name, value in given.items() if value is not None}
+    command = [sys.executable, "-c", KEPT]
+    done = subprocess.run(command, env=given, capture_output=True, text=True)  # type: ignore[arg-type]
+    assert done.returncode == 0, done.stderr
+    return done.stdout.split("] ")[1].split(), done.stderr
+
+
+def test_kernels_are_kept_where_the_user_says(tmp_path: Path):
+    folder = str(tmp_path / "kept")
+    named = {"KUMITE_CACHE": folder, "NUMBA_CACHE_DIR": None}
+    assert _kept(**named) == (["0", folder], "")
+    assert _kept(**named) == (["1", folder], "")
+    for path in (tmp_path / "kept").rglob("*.nbc"):  # cut off by a full disk
+        path.write_bytes(path.read_bytes()[:-100])
+    assert _kept(**named) == (["0", folder], "")
+
+
+def test_without_a_place_to_keep_kernels_it_runs_and_says_so(tmp_path: Path):
+    (tmp_path / "file").touch()
+    for named in ({"KUMITE_CACHE": f"{tmp_path}/file/in"}, {"XDG_CACHE_HOME": f"{tmp_path}/file"}):
+        (hits, where), said = _kept(**{"KUMITE_CACHE": None, "NUMBA_CACHE_DIR": None, **named})
+        assert hits == "0" and not Path(where).exists()  # a temporary one, gone with the process
+        assert said.count("\n") == 1 and "name a folder to keep them in with KUMITE_CACHE" in said

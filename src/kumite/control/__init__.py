@@ -1,5 +1,6 @@
 """Controllers: given what a character sees, choose its next action."""
 
+from kumite.caches import cache_folder
 from kumite.control.approaching import Approach, approach_motions, trained_approach
 from kumite.control.attack import Attack, thrown
 from kumite.control.avoidance import Avoidance, AvoidanceRules, AvoidanceSearch, Standing
@@ -38,7 +39,7 @@ from kumite.control.preparation import (
 )
 from kumite.control.routes import CheckPoint, Missed, Progress, Reached, Route
 from kumite.control.styles import STYLES, Style, short_range, style
-from kumite.control.trained import cache_folder, trained
+from kumite.control.trained import trained
 from kumite.control.worth import Worth, measure_worth
 
 __all__ = [

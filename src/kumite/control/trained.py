@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-import os
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -18,14 +17,6 @@ from kumite.graph import Library
 KIND = "policy"
 VERSION = 1
 RESIDUAL = 1e-4
-
-
-def cache_folder(library_path: Path | str | None) -> Path:
-    """Beside the library file; in the user's cache for the built-in performer."""
-    if library_path is not None:
-        return Path(f"{library_path}.cache")
-    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    return Path(base) / "kumite"
 
 
 def trained(

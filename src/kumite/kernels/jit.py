@@ -2,49 +2,20 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
-import re
 from collections.abc import Callable
-from functools import cache
-from pathlib import Path
 from types import FunctionType
 from typing import Any
 
 from numba import njit
 
-_IMPORT = re.compile(rb"^from kumite\.kernels\.(\w+) import", re.MULTILINE)
-
-
-# Numba keeps compiled code while the function's own file is the same; but a kernel holds the code
-# and the constants of those it calls in other files. So it is kept while all of those are the same.
-@cache
-def _sources(file: str) -> tuple[str, ...]:
-    """The digests of a file and of every kernel module that it imports, directly or not."""
-    found: dict[Path, bytes] = {}
-    waiting = [Path(file)]
-    while waiting:
-        path = waiting.pop()
-        if path in found or not path.is_file():
-            continue
-        found[path] = path.read_bytes()
-        names = _IMPORT.findall(found[path])
-        waiting += [Path(__file__).with_name(f"{name.decode()}.py") for name in names]
-    return tuple(sorted(hashlib.sha256(text).hexdigest() for text in found.values()))
-
-
-def _stamp(dispatcher: Any, *more: Any) -> None:
-    """Keep its compiled code while the sources behind it, and behind ``more``, are the same."""
-    # Not a public name; where it is gone (or nothing is compiled) Numba's own rule holds.
-    with contextlib.suppress(AttributeError):
-        files = [d.py_func.__code__.co_filename for d in (dispatcher, *more)]
-        dispatcher._cache._cache_file._source_stamp = tuple(_sources(file) for file in files)
+from kumite.kernels import kept
 
 
 def _kept_while_its_sources_are(decorate: Callable[..., Any]) -> Callable[..., Any]:
     def compile_lazily(function: Callable[..., Any]) -> Any:
         dispatcher = decorate(function)
-        _stamp(dispatcher)
+        kept.keep(dispatcher)
         return dispatcher
 
     return compile_lazily
@@ -53,14 +24,12 @@ def _kept_while_its_sources_are(decorate: Callable[..., Any]) -> Callable[..., A
 # error_model="numpy": no exceptions inside loops. Of fast-math only contraction (fused
 # multiply-add): nothing is reordered, so a run gives the same bytes as the last, whatever the
 # number of threads.
-kernel = _kept_while_its_sources_are(
-    njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
-)
+kernel = _kept_while_its_sources_are(njit(nogil=True, error_model="numpy", fastmath={"contract"}))
 # Numba counts who uses an array whenever a tuple of arrays is looked into, one count for all cores:
 # most of the time of small kernels that are handed large tuples. These count nothing, so they must
 # neither make arrays nor return any to a kernel that counts. (Not a public option.)
 lean_kernel = _kept_while_its_sources_are(
-    njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, _nrt=False)  # type: ignore[call-overload]
+    njit(nogil=True, error_model="numpy", fastmath={"contract"}, _nrt=False)  # type: ignore[call-overload]
 )
 
 
@@ -73,10 +42,8 @@ def parallel_kernel(function: Callable[..., Any]) -> Any:
     copy = FunctionType(function.__code__, function.__globals__, function.__name__)
     copy.__qualname__ = f"{function.__qualname__}_on_all_cores"
     copy.__doc__ = function.__doc__
-    dispatcher = njit(
-        cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, parallel=True
-    )(copy)
-    _stamp(dispatcher)
+    dispatcher = njit(nogil=True, error_model="numpy", fastmath={"contract"}, parallel=True)(copy)
+    kept.keep(dispatcher)
     return dispatcher
 
 
@@ -100,8 +67,8 @@ def plugged(template: Callable[..., Any], parallel: bool = False, **plugs: Any) 
     copy = FunctionType(code, {**template.__globals__, **plugs}, template.__name__)
     copy.__qualname__ = f"{template.__qualname__}_{_digest(names)}"
     copy.__doc__ = template.__doc__
-    dispatcher = njit(cache=True, nogil=True, error_model="numpy", parallel=parallel)(copy)
-    _stamp(dispatcher, *plugs.values())
+    dispatcher = njit(nogil=True, error_model="numpy", parallel=parallel)(copy)
+    kept.keep(dispatcher, *plugs.values())
     return dispatcher
 
 
