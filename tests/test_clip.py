@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -159,8 +161,53 @@ def test_check_names_every_problem():
     assert clips.check(c) == []
     root = c.root_position.copy()
     root[2, 0] = 50.0
-    wxyz = c.wxyz * 1.01
+    wxyz = c.wxyz * 1.0001
     problems = clips.check(clips.Clip("odd", c.skeleton, 30, root, wxyz))
     assert len(problems) == 2 and "unit length" in problems[0] and "after frame 1" in problems[1]
-    root[1] = np.nan
-    assert "frame 1" in clips.check(clips.Clip("odd", c.skeleton, 30, root, c.wxyz))[0]
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "said"),
+    [
+        ("root_position", np.nan, "root_position: nan at [1, 0]; expected finite numbers"),
+        ("root_position", -np.inf, "root_position: -inf at [1, 0]; expected finite numbers"),
+        ("root_position", 1e12, "root_position: 1000000000000.0; expected at most 1e+09"),
+        ("wxyz", np.nan, "wxyz: nan at [1, 0, 0]; expected finite numbers"),
+        ("wxyz", 0.0, "wxyz: a length of 0 at [1, 0]; expected unit quaternions"),
+    ],
+)
+def test_poses_are_checked_where_a_clip_is_made(field, value, said):
+    c = toys.still(4)
+    root, wxyz = c.root_position.copy(), c.wxyz.copy()
+    (root if field == "root_position" else wxyz)[1] = value
+    for make in (
+        lambda: clips.Clip("odd", c.skeleton, 30, root, wxyz),
+        lambda: clips.ClipSet(c.skeleton, 30, ("odd",), np.array([0, 4]), root, wxyz),
+    ):
+        with pytest.raises(KumiteError, match=re.escape(said)):
+            make()
+
+
+def test_forward_kinematics_takes_any_leading_axes():
+    rng = np.random.default_rng(3)
+    skeleton = toys.still(1).skeleton
+    root = rng.normal(size=(5, 2, 3)).astype(np.float32)
+    wxyz = rng.normal(size=(5, 2, len(skeleton), 4))
+    wxyz /= np.linalg.norm(wxyz, axis=-1, keepdims=True)
+    position, world = clips.forward_kinematics(skeleton, root, wxyz)
+    facing = clips.facing_frame(skeleton, root, wxyz)
+    assert facing.shape == (5, 2, 3)
+    for k in range(2):
+        alone = clips.forward_kinematics(skeleton, root[:, k], wxyz[:, k])
+        assert np.array_equal(position[:, k], alone[0]) and np.array_equal(world[:, k], alone[1])
+        assert np.array_equal(facing[:, k], clips.facing_frame(skeleton, root[:, k], wxyz[:, k]))
+    one = clips.forward_kinematics(skeleton, root[3, 1], wxyz[3, 1])
+    assert np.array_equal(one[0], position[3, 1])
+    spread = clips.forward_kinematics(
+        skeleton, root[3], wxyz[:, 1][:, None]
+    )  # [2, 3], [5, 1, J, 4]
+    assert spread[0].shape == (5, 2, len(skeleton), 3)
+    with pytest.raises(KumiteError, match=r"wxyz is \[5, 2, 4\], expected \[…, \d+, 4\]"):
+        clips.forward_kinematics(skeleton, root, wxyz[:, :, 0])
+    with pytest.raises(KumiteError, match="leading axes that go together"):
+        clips.forward_kinematics(skeleton, root[:4], wxyz)

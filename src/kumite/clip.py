@@ -12,8 +12,9 @@ from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from kumite import rotation
+from kumite import checks, rotation
 from kumite.errors import KumiteError
 from kumite.kernels import pose as pose_kernels
 
@@ -39,26 +40,6 @@ LIMBS = ("left_hand", "right_hand", "left_foot", "right_foot")
 """The limbs that can strike, in the order of every [.., 4] limb array."""
 
 
-def _frozen(array: np.ndarray, dtype: type) -> np.ndarray:
-    out = np.ascontiguousarray(array, dtype=dtype)
-    if out.flags.writeable:
-        out = out.copy() if out is array else out
-        out.flags.writeable = False
-    return out
-
-
-def freeze(record: object, what: str, **fields: tuple[type, tuple[int, ...]]) -> None:
-    """Give a frozen dataclass' arrays their dtype and make them read-only, in place.
-
-    fields: name=(dtype, shape). Errors: a shape that does not fit, told as ``what``'s.
-    """
-    for name, (dtype, shape) in fields.items():
-        array = _frozen(getattr(record, name), dtype)
-        if array.shape != shape:
-            raise KumiteError(f"{what}: {name} is {list(array.shape)}, expected {list(shape)}")
-        object.__setattr__(record, name, array)
-
-
 @dataclass(frozen=True)
 class Skeleton:
     """A tree of joints with rigid bones, parents before children."""
@@ -72,27 +53,35 @@ class Skeleton:
 
     def __post_init__(self) -> None:
         put = object.__setattr__
-        put(self, "names", tuple(self.names))
-        put(self, "parents", _frozen(self.parents, np.int32))
-        put(self, "offsets", _frozen(self.offsets, np.float64))
-        put(self, "tip_parents", _frozen(self.tip_parents, np.int32))
-        put(self, "tip_offsets", _frozen(np.reshape(self.tip_offsets, (-1, 3)), np.float64))
-        put(self, "roles", MappingProxyType({k: int(v) for k, v in self.roles.items()}))
+        put(self, "names", checks.names(self.names, "skeleton: joint names"))
         count = len(self.names)
-        if self.parents.shape != (count,) or self.offsets.shape != (count, 3):
-            raise KumiteError(
-                f"skeleton: {count} names, parents {self.parents.shape}, "
-                f"offsets {self.offsets.shape}; expected [J], [J], [J, 3]"
-            )
-        if count == 0 or self.parents[0] != NO_PARENT:
+        if count == 0:
+            raise KumiteError("skeleton: no joints; expected at least the root")
+        roles = checks.mapping(self.roles, "skeleton: roles")
+        roles = {k: checks.whole(j, f"skeleton: the joint of {k!r}") for k, j in roles.items()}
+        put(self, "roles", MappingProxyType(roles))
+        put(
+            self,
+            "tip_offsets",
+            np.zeros((0, 3)) if np.size(self.tip_offsets) == 0 else self.tip_offsets,
+        )
+        checks.freeze(
+            self,
+            "skeleton",
+            parents=(np.int32, (count,)),
+            offsets=(float, (count, 3)),
+            tip_parents=(np.int32, ("T",)),
+            tip_offsets=(float, ("T", 3)),
+        )
+        if self.parents[0] != NO_PARENT:
             raise KumiteError("skeleton: the first joint must be the root")
         if np.any(self.parents[1:] < 0) or np.any(self.parents[1:] >= np.arange(1, count)):
             raise KumiteError("skeleton: parents must come before their children")
-        if len(set(self.names)) != count:
-            twice = sorted({n for n in self.names if self.names.count(n) > 1})
-            raise KumiteError(f"skeleton: joint names used twice: {', '.join(twice)}")
-        if not np.all(np.isfinite(self.offsets)):
-            raise KumiteError("skeleton: offsets must be finite")
+        for role, joint in roles.items():
+            if not 0 <= joint < count:
+                raise KumiteError(f"skeleton: {role} is joint {joint}; expected 0 to {count - 1}")
+        if np.any((self.tip_parents < 0) | (self.tip_parents >= count)):
+            raise KumiteError(f"skeleton: tip parents must be joints, 0 to {count - 1}")
 
     def __len__(self) -> int:
         return len(self.names)
@@ -152,13 +141,13 @@ class Skeleton:
         either, the bone carried on by half its length.
         """
         joint = self.joint(role)
-        below = [joint]
-        for j in range(joint + 1, len(self)):
-            if self.parents[j] in below:
-                below.append(j)
+        below = {joint: None}  # in order
+        for j, parent in enumerate(self.parents.tolist()):
+            if parent in below:
+                below[j] = None
         rest = self.rest_positions
         ends = [(int(p), o) for p, o in zip(self.tip_parents, self.tip_offsets) if p in below]
-        ends = ends or [(j, np.zeros(3)) for j in below[1:]]
+        ends = ends or [(j, np.zeros(3)) for j in below if j != joint]
         if not ends:
             return joint, 0.5 * self.offsets[joint]
         far = max(ends, key=lambda e: float(np.linalg.norm(rest[e[0]] + e[1] - rest[joint])))
@@ -206,22 +195,10 @@ class Clip:
     notes: tuple[str, ...] = ()  # what was inferred or repaired on the way in
 
     def __post_init__(self) -> None:
-        put = object.__setattr__
-        put(self, "root_position", _frozen(self.root_position, np.float64))
-        put(self, "wxyz", _frozen(self.wxyz, np.float64))
-        frames = len(self.root_position)
-        if self.root_position.shape != (frames, 3):
-            raise KumiteError(
-                f"{self.name}: root_position {self.root_position.shape}, expected [F, 3]"
-            )
-        if self.wxyz.shape != (frames, len(self.skeleton), 4):
-            raise KumiteError(
-                f"{self.name}: wxyz {self.wxyz.shape}, expected {(frames, len(self.skeleton), 4)}"
-            )
-        if frames == 0:
-            raise KumiteError(f"{self.name}: no frames")
-        if not (np.isfinite(self.fps) and self.fps > 0):
-            raise KumiteError(f"{self.name}: {self.fps} frames a second, expected more than 0")
+        checks.text(self.name, "clip: name")
+        checks.instance(self.skeleton, Skeleton, f"{self.name}: skeleton")
+        object.__setattr__(self, "fps", checks.fps(self.fps, f"{self.name}: fps"))
+        _check_motion(self, self.name)
 
     def __len__(self) -> int:
         return len(self.root_position)
@@ -229,6 +206,17 @@ class Clip:
     @property
     def seconds(self) -> float:
         return len(self) / self.fps
+
+
+def _check_motion(motion: Clip | ClipSet, what: str) -> int:
+    """Check poses and freeze them: their number. Errors: as a clip's."""
+    joints = len(motion.skeleton)
+    fields = {"root_position": (float, ("F", 3)), "wxyz": (float, ("F", joints, 4))}
+    frames = checks.freeze(motion, what, **fields)["F"]
+    if frames == 0:
+        raise KumiteError(f"{what}: no frames")
+    checks.unit_quaternions(motion.wxyz, f"{what}: wxyz")
+    return frames
 
 
 @dataclass(frozen=True)
@@ -244,19 +232,15 @@ class ClipSet:
 
     def __post_init__(self) -> None:
         put = object.__setattr__
-        put(self, "names", tuple(self.names))
-        put(self, "clip_start", _frozen(self.clip_start, np.int64))
-        put(self, "root_position", _frozen(self.root_position, np.float64))
-        put(self, "wxyz", _frozen(self.wxyz, np.float64))
-        frames = len(self.root_position)
-        if self.clip_start.shape != (len(self.names) + 1,) or len(self.names) == 0:
-            raise KumiteError("clip set: expected one start a clip and the end")
+        checks.instance(self.skeleton, Skeleton, "clip set: skeleton")
+        put(self, "fps", checks.fps(self.fps, "clip set: fps"))
+        put(self, "names", checks.names(self.names, "clip set: clip names", least=1))
+        checks.freeze(self, "clip set", clip_start=(np.int64, (len(self.names) + 1,)))
+        frames = _check_motion(self, "clip set")
         if self.clip_start[0] != 0 or self.clip_start[-1] != frames:
             raise KumiteError("clip set: clip_start must run from 0 to F")
-        if np.any(np.diff(self.clip_start) <= 0):
+        if not checks.rising(self.clip_start):
             raise KumiteError("clip set: every clip needs at least one frame")
-        if self.wxyz.shape != (frames, len(self.skeleton), 4):
-            raise KumiteError(f"clip set: wxyz {self.wxyz.shape} does not fit the skeleton")
 
     def __len__(self) -> int:
         return len(self.root_position)
@@ -293,52 +277,95 @@ class ClipSet:
 
 
 def forward_kinematics(
-    skeleton: Skeleton, root_position: np.ndarray, wxyz: np.ndarray
+    skeleton: Skeleton, root_position: ArrayLike, wxyz: ArrayLike
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Joint positions [F, J, 3] and world rotations [F, J, 4] of poses [F, 3], [F, J, 4]."""
-    root_position = np.ascontiguousarray(root_position, dtype=np.float64)
-    wxyz = np.ascontiguousarray(wxyz, dtype=np.float64)
-    position = np.empty((*wxyz.shape[:2], 3))
-    world = np.empty(wxyz.shape)
-    many = len(root_position) >= pose_kernels.MANY
+    """Joint positions [..., J, 3] and world rotations [..., J, 4] of poses [..., 3], [..., J, 4].
+
+    Leading axes go together as NumPy's do. Errors: another shape; no numbers.
+    """
+    root, pose = _poses(skeleton, root_position, wxyz)
+    lead = root.shape[:-1]
+    if len(lead) != 1:
+        root, pose = root.reshape(-1, 3), pose.reshape(-1, len(skeleton), 4)
+    position = np.empty((*pose.shape[:2], 3))
+    world = np.empty(pose.shape)
+    many = len(root) >= pose_kernels.MANY
     run = pose_kernels.forward_kinematics_many if many else pose_kernels.forward_kinematics
-    run(skeleton.parents, skeleton.offsets, root_position, wxyz, position, world)
+    run(skeleton.parents, skeleton.offsets, root, pose, position, world)
+    if len(lead) != 1:
+        position, world = position.reshape(*lead, -1, 3), world.reshape(*lead, -1, 4)
     return position, world
+
+
+def _poses(
+    skeleton: Skeleton, root_position: ArrayLike, wxyz: ArrayLike
+) -> tuple[np.ndarray, np.ndarray]:
+    """Poses [..., 3], [..., J, 4] of the same leading axes, contiguous. Errors: other shapes."""
+    joints = len(checks.instance(skeleton, Skeleton, "skeleton"))
+    # Whether they are finite is the caller's: this is called for every picture.
+    root = checks.array(root_position, "root_position", (..., 3), finite=False)
+    pose = checks.array(wxyz, "wxyz", (..., joints, 4), finite=False)
+    if root.shape[:-1] != pose.shape[:-2]:
+        try:
+            lead = np.broadcast_shapes(root.shape[:-1], pose.shape[:-2])
+        except ValueError:
+            raise KumiteError(
+                f"root_position is {list(root.shape)} and wxyz {list(pose.shape)}, "
+                "expected [..., 3] and [..., J, 4] with leading axes that go together"
+            ) from None
+        root = np.ascontiguousarray(np.broadcast_to(root, (*lead, 3)))
+        pose = np.ascontiguousarray(np.broadcast_to(pose, (*lead, joints, 4)))
+    return root, pose
 
 
 def tip_positions(
     skeleton: Skeleton, role: str, position: np.ndarray, world_wxyz: np.ndarray
 ) -> np.ndarray:
-    """World positions [..., 3] of a role's far end, from world poses [..., J, 3], [..., J, 4]."""
+    """World positions [..., 3] of a role's far end, from world poses [..., J, 3], [..., J, 4].
+
+    Errors: another shape; no such role.
+    """
+    joints = len(checks.instance(skeleton, Skeleton, "skeleton"))
     joint, offset = skeleton.tip(role)
+    position = checks.array(position, "position", (..., joints, 3), finite=False)
+    world_wxyz = checks.array(world_wxyz, "world_wxyz", (..., joints, 4), finite=False)
     return position[..., joint, :] + rotation.rotate(world_wxyz[..., joint, :], offset)
 
 
-def facing_frame(skeleton: Skeleton, root_position: np.ndarray, wxyz: np.ndarray) -> np.ndarray:
-    """Planar facing frames [F, 3] (x, z, yaw): below the pelvis, at right angles to the hips.
+def facing_frame(skeleton: Skeleton, root_position: ArrayLike, wxyz: ArrayLike) -> np.ndarray:
+    """Planar facing frames [F, ..., 3] (x, z, yaw) of poses [F, ..., 3] and [F, ..., J, 4]: below
+    the pelvis, at right angles to the hips.
 
-    Falls back to the last clear direction where the hips' axis is nearly upright.
+    Falls back to the last clear direction where the hips' axis is nearly upright. Errors: other
+    shapes; no numbers; a skeleton without pelvis or hips.
     """
+    p, pose = _poses(skeleton, root_position, wxyz)
     pelvis = skeleton.joint("pelvis")
-    q = wxyz[..., 0, :]
-    p = np.asarray(root_position, dtype=np.float64)
+    q = pose[..., 0, :]
     for j in skeleton.chain(0, pelvis):
         p = p + rotation.rotate(q, skeleton.offsets[j])
-        q = rotation.multiply(q, wxyz[..., j, :])
+        q = rotation.multiply(q, pose[..., j, :])
     lateral = rotation.rotate(q, skeleton.lateral_axis)
     yaw = np.arctan2(-lateral[..., 2], lateral[..., 0])
     clear = np.hypot(lateral[..., 0], lateral[..., 2]) > 0.1
-    if not np.all(clear) and np.any(clear):
-        last = np.maximum.accumulate(np.where(clear, np.arange(len(yaw)), -1))
-        last[last < 0] = np.flatnonzero(clear)[0]
-        yaw = yaw[last]
+    if yaw.ndim and not np.all(clear):
+        yaw = _last_clear(yaw.reshape(len(yaw), -1), clear.reshape(len(yaw), -1)).reshape(yaw.shape)
     return np.stack([p[..., 0], p[..., 2], yaw], axis=-1)
+
+
+def _last_clear(yaw: np.ndarray, clear: np.ndarray) -> np.ndarray:
+    """Directions [F, N] of which those that are not clear are the last clear ones before, or the
+    first after."""
+    last = np.maximum.accumulate(np.where(clear, np.arange(len(yaw))[:, None], -1), axis=0)
+    last = np.where(last < 0, np.argmax(clear, axis=0), last)  # frame 0 where none is clear
+    out = np.take_along_axis(yaw, last, axis=0)
+    return np.where(clear.any(axis=0), out, yaw)
 
 
 def resample(clip: Clip, fps: float) -> Clip:
     """The clip at another rate: positions linearly, rotations along the shortest arc."""
-    if not (np.isfinite(fps) and fps > 0):
-        raise KumiteError(f"{clip.name}: cannot resample to {fps} frames a second")
+    checks.instance(clip, Clip, "resample")
+    fps = checks.fps(fps, f"{clip.name}: the rate to resample to")
     if fps == clip.fps:
         return clip
     frames = (len(clip) - 1) * fps / clip.fps
@@ -364,6 +391,7 @@ def resample(clip: Clip, fps: float) -> Clip:
 
 def mirror(clip: Clip, name: str | None = None) -> Clip:
     """The clip seen in a mirror: left and right change places, x changes sign."""
+    checks.instance(clip, Clip, "mirror")
     flip = np.array([1.0, 1.0, -1.0, -1.0])
     wxyz = clip.wxyz[:, clip.skeleton.mirror_joints] * flip
     root = clip.root_position * np.array([-1.0, 1.0, 1.0])
@@ -373,9 +401,6 @@ def mirror(clip: Clip, name: str | None = None) -> Clip:
 def check(clip: Clip) -> list[str]:
     """Everything that looks wrong with a clip's data, at once; empty when nothing does."""
     problems = []
-    bad = ~np.isfinite(clip.root_position).all(axis=1) | ~np.isfinite(clip.wxyz).all(axis=(1, 2))
-    if bad.any():
-        return [f"{clip.name}: frame {int(np.argmax(bad))} holds values that are not finite"]
     off = np.abs(np.linalg.norm(clip.wxyz, axis=-1) - 1).max()
     if off > 1e-6:
         problems.append(f"{clip.name}: quaternions are not unit length (off by {off:.2g})")
@@ -414,8 +439,13 @@ def concatenate(clips: Sequence[Clip], fps: float | None = None) -> ClipSet:
 
     Errors: no clips; two skeletons (named, with the first joint that differs).
     """
+    if not isinstance(clips, Sequence):
+        raise KumiteError(f"clips: {checks.a(clips)}; expected a list of clips")
     if not clips:
         raise KumiteError("no clips to put together")
+    for clip in clips:
+        checks.instance(clip, Clip, "clips")
+    rate = min(c.fps for c in clips) if fps is None else checks.fps(fps, "fps")
     first = clips[0]
     for clip in clips[1:]:
         if not first.skeleton.same_as(clip.skeleton):
@@ -423,7 +453,6 @@ def concatenate(clips: Sequence[Clip], fps: float | None = None) -> ClipSet:
                 f"two skeletons in one library: {first.name} and {clip.name} differ "
                 f"{_first_difference(first.skeleton, clip.skeleton)}; expected one skeleton"
             )
-    rate = fps or min(c.fps for c in clips)
     names = [c.name for c in clips]
     if len(set(names)) != len(names):
         twice = sorted({n for n in names if names.count(n) > 1})

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 
@@ -15,6 +16,15 @@ def at(path: Path | str, line: int | None, what: str) -> KumiteError:
     """An error at a place in a file: ``walk.bvh:17: unknown channel 'Wrotation'; expected …``."""
     where = f"{path}:{line}" if line is not None else f"{path}"
     return KumiteError(f"{where}: {what}")
+
+
+@contextlib.contextmanager
+def told_of(path: Path | str) -> Iterator[None]:
+    """What is refused within is told as a fault of a file."""
+    try:
+        yield
+    except KumiteError as error:
+        raise at(path, None, str(error)) from None
 
 
 def unknown(kind: str, name: str, valid: Iterable[str]) -> KumiteError:

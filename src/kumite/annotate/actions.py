@@ -16,7 +16,8 @@ from kumite.annotate.contacts import Contacts
 from kumite.annotate.kinds import KindSettings, find_kind, find_trajectories, strike_directions
 from kumite.annotate.segments import Cut, CutSettings, find_cuts, find_motion
 from kumite.annotate.strikes import Strikes
-from kumite.clip import LIMBS, ClipSet, freeze
+from kumite.checks import freeze, names, rising
+from kumite.clip import LIMBS, ClipSet
 from kumite.errors import KumiteError
 
 KINDS = ("attack", "defence", "transition", "reaction", "idle")
@@ -47,7 +48,7 @@ class Actions:
     clip_start: np.ndarray  # [C + 1] int64, of the set of clips
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "label", tuple(self.label))
+        object.__setattr__(self, "label", names(self.label, "actions: labels", unlike=False))
         count = len(self.label)
         freeze(
             self,
@@ -57,12 +58,14 @@ class Actions:
             kind=(np.int32, (count,)),
             limb=(np.int32, (count,)),
             direction=(np.int32, (count,)),
-            clip_start=(np.int64, np.shape(self.clip_start)),
+            clip_start=(np.int64, ("C + 1",)),
         )
         if np.any(self.stop <= self.start):
             raise KumiteError("actions: an action must stop after it starts")
         if np.any(self.start[1:] < self.stop[:-1]):
             raise KumiteError("actions: they overlap, or are not in order")
+        if list(self.clip_start[:1]) != [0] or not rising(self.clip_start):
+            raise KumiteError("actions: clips must start at 0, one after the other")
         frames = int(self.clip_start[-1])
         if count and (self.start[0] < 0 or self.stop[-1] > frames):
             raise KumiteError(f"actions: one lies outside the {frames} frames")

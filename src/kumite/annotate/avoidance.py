@@ -31,7 +31,8 @@ from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 from kumite.annotate.actions import KINDS, Actions, find_actions
 from kumite.annotate.contacts import Contacts
 from kumite.annotate.strikes import find_strikes
-from kumite.clip import SIDES, ClipSet, freeze, runs
+from kumite.checks import freeze, rising
+from kumite.clip import SIDES, ClipSet, runs
 from kumite.errors import KumiteError
 from kumite.rotation import planar_apply, planar_inverse
 
@@ -54,14 +55,16 @@ class AvoidanceParts:
         freeze(
             self,
             "avoidance parts",
-            start=(np.int64, (len(self.start),)),
-            stop=(np.int64, (len(self.start),)),
-            clip_start=(np.int64, np.shape(self.clip_start)),
+            start=(np.int64, ("P",)),
+            stop=(np.int64, ("P",)),
+            clip_start=(np.int64, ("C + 1",)),
         )
         if np.any(self.stop <= self.start):
             raise KumiteError("avoidance parts: a part must stop after it starts")
         if np.any(self.start[1:] < self.stop[:-1]):
             raise KumiteError("avoidance parts: they overlap, or are not in order")
+        if list(self.clip_start[:1]) != [0] or not rising(self.clip_start):
+            raise KumiteError("avoidance parts: clips must start at 0, one after the other")
         frames = int(self.clip_start[-1])
         if len(self) and (self.start[0] < 0 or self.stop[-1] > frames):
             raise KumiteError(f"avoidance parts: one lies outside the {frames} frames")

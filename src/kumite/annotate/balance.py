@@ -16,7 +16,8 @@ from kumite.annotate.contacts import Contacts
 from kumite.body import Body, lay_body
 from kumite.body.segments import foot_line
 from kumite.body.stance import stand
-from kumite.clip import SIDES, ClipSet, Skeleton, freeze
+from kumite.checks import freeze
+from kumite.clip import SIDES, ClipSet, Skeleton
 from kumite.errors import KumiteError
 from kumite.kernels import balance as kernels
 
@@ -42,8 +43,8 @@ class Balance:
             centre=(float, (frames, 3)),
             corner=(float, (frames, 2, CORNERS, 2)),
             touches=(np.bool_, (frames, 2, CORNERS)),
-            distance=(float, (frames,)),
         )
+        freeze(self, "balance", False, distance=(float, (frames,)))
 
     @property
     def balanced(self) -> np.ndarray:

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kumite.clip import SIDES, ClipSet, freeze, runs
+from kumite.checks import freeze
+from kumite.clip import SIDES, ClipSet, runs
 from kumite.errors import KumiteError
 
 STANDING_PERCENTILE = 5.0  # of a joint's heights: low, but above the outliers
@@ -25,8 +26,7 @@ class Contacts:
     resting_height: np.ndarray  # [2, 2] m, of the ankle and the toe of the left and right foot
 
     def __post_init__(self) -> None:
-        frames = len(self.on_ground)
-        freeze(self, "contacts", on_ground=(np.bool_, (frames, 2)), resting_height=(float, (2, 2)))
+        freeze(self, "contacts", on_ground=(np.bool_, ("F", 2)), resting_height=(float, (2, 2)))
 
     def lift_off(self, clip_start: np.ndarray) -> np.ndarray:
         """Last frame of contact before a foot leaves the ground [F, 2] bool, within a clip."""

@@ -17,7 +17,8 @@ import numpy as np
 
 from kumite.annotate.actions import KINDS, Actions
 from kumite.annotate.contacts import Contacts, velocity
-from kumite.clip import SIDES, ClipSet, forward_kinematics, freeze, runs
+from kumite.checks import fps, freeze, names
+from kumite.clip import SIDES, ClipSet, forward_kinematics, runs
 from kumite.errors import KumiteError, unknown
 from kumite.rotation import (
     conjugate,
@@ -69,7 +70,8 @@ class Cycles:
     fps: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "label", tuple(self.label))
+        object.__setattr__(self, "label", names(self.label, "cycles: labels", unlike=False))
+        object.__setattr__(self, "fps", fps(self.fps, "cycles: fps"))
         count = len(self.label)
         freeze(
             self,

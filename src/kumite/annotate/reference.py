@@ -19,7 +19,8 @@ import numpy as np
 from kumite.annotate.balance import Balance, find_balance
 from kumite.annotate.contacts import Contacts
 from kumite.annotate.strikes import Strikes
-from kumite.clip import LEG_ROLES, SIDES, ClipSet, freeze
+from kumite.checks import freeze
+from kumite.clip import LEG_ROLES, SIDES, ClipSet
 from kumite.errors import KumiteError
 from kumite.rotation import angle, conjugate, from_yaw, multiply
 

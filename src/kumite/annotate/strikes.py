@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kumite.annotate.contacts import velocity
-from kumite.clip import LIMBS, ClipSet, freeze, runs, tip_positions
+from kumite.checks import freeze
+from kumite.clip import LIMBS, ClipSet, runs, tip_positions
 from kumite.errors import KumiteError
 from kumite.rotation import planar_apply, planar_inverse
 
@@ -41,19 +42,19 @@ class Strikes:
     velocity: np.ndarray  # [X, 3] m/s of the tip, in the facing frame of ``frame``
 
     def __post_init__(self) -> None:
-        frames, blows, limbs = len(self.effective), len(self.frame), len(LIMBS)
-        freeze(
+        limbs = len(LIMBS)
+        frames = freeze(
             self,
             "strikes",
-            effective=(np.bool_, (frames, limbs)),
-            tip=(float, (frames, limbs, 3)),
-            speed=(float, (frames, limbs)),
-            frame=(np.int32, (blows,)),
-            start=(np.int32, (blows,)),
-            stop=(np.int32, (blows,)),
-            limb=(np.int32, (blows,)),
-            velocity=(float, (blows, 3)),
-        )
+            effective=(np.bool_, ("F", limbs)),
+            tip=(float, ("F", limbs, 3)),
+            speed=(float, ("F", limbs)),
+            frame=(np.int32, ("X",)),
+            start=(np.int32, ("X",)),
+            stop=(np.int32, ("X",)),
+            limb=(np.int32, ("X",)),
+            velocity=(float, ("X", 3)),
+        )["F"]
         inside = (self.start >= 0) & (self.start <= self.frame) & (self.frame < self.stop)
         if not np.all(inside & (self.stop <= frames) & (self.limb >= 0) & (self.limb < limbs)):
             raise KumiteError("strikes: a blow lies outside the frames or the limbs")

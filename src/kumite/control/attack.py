@@ -13,7 +13,8 @@ from functools import cached_property
 import numpy as np
 
 from kumite.body import Spheres, limb_spheres
-from kumite.clip import Skeleton, forward_kinematics, freeze
+from kumite.checks import freeze
+from kumite.clip import Skeleton, forward_kinematics
 from kumite.errors import KumiteError
 from kumite.kernels.avoid import Attacks
 

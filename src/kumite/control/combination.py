@@ -43,7 +43,8 @@ import numpy as np
 from kumite.annotate import DIRECTIONS, KINDS, NO_LIMB, Actions
 from kumite.annotate.contacts import velocity
 from kumite.annotate.kinds import OUTWARD, UPWARD, strike_directions
-from kumite.clip import LIMBS, ClipSet, freeze, tip_positions
+from kumite.checks import freeze
+from kumite.clip import LIMBS, ClipSet, tip_positions
 from kumite.errors import KumiteError, unknown
 from kumite.graph import Library
 

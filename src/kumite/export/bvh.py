@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from kumite import rotation
+from kumite.checks import instance
 from kumite.clip import Clip, Skeleton
 from kumite.errors import KumiteError
 from kumite.files import writing
@@ -28,16 +29,15 @@ def write_bvh(
     ``order`` is the order of the rotation channels; each turns in the axes that the ones before it
     left. The file appears whole or not at all.
 
-    Errors: an unknown order, a scale that is not a positive number, values that are not finite, a
-    joint name that BVH cannot hold.
+    Errors: an unknown order, a scale that is not a positive number, a joint name that BVH cannot
+    hold.
     """
     order = order.upper()
     if order not in ORDERS:
         raise KumiteError(f"rotation order {order!r}; expected one of {', '.join(ORDERS)}")
     if not (np.isfinite(metres_per_unit) and metres_per_unit > 0):
         raise KumiteError(f"{metres_per_unit} metres per unit; expected a number more than 0")
-    if not (np.isfinite(clip.root_position).all() and np.isfinite(clip.wxyz).all()):
-        raise KumiteError(f"{clip.name}: poses that are not finite cannot be written")
+    instance(clip, Clip, "write_bvh")
     header, joints = _hierarchy(clip.skeleton, metres_per_unit, order)
     angles = rotation.to_euler(order, clip.wxyz[:, joints], degrees=True)
     values = np.concatenate(

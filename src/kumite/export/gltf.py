@@ -18,6 +18,8 @@ import pygltflib as gltf
 from kumite import files
 from kumite.body import BodyMesh, Palette, body_mesh, palettes
 from kumite.body.mesh import ROLES
+from kumite.checks import fps as checked_fps
+from kumite.checks import instance
 from kumite.clip import MOST_FRAMES, NO_PARENT, Skeleton
 from kumite.errors import KumiteError
 from kumite.rotation import continuous, from_yaw, slerp
@@ -36,11 +38,9 @@ def write_glb(path: Path | str, recording: Recording, *, fps: float | None = Non
 
     ``fps``: keys a second, the recording's own unless given.
 
-    Errors: values that are not finite; a rate that is not more than 0; a file that cannot be
-    written.
+    Errors: a rate that is not more than 0; a file that cannot be written.
     """
-    if not (np.isfinite(recording.root_position).all() and np.isfinite(recording.wxyz).all()):
-        raise KumiteError(f"{path}: the recording holds values that are not finite")
+    instance(recording, Recording, "write_glb")
     if fps is not None and fps != recording.fps:
         recording = _at_rate(recording, fps)
     document = _Document(recording.scene, len(recording), recording.fps)
@@ -63,8 +63,7 @@ def _at_rate(recording: Recording, fps: float) -> Recording:
 
     Its events are left out: they count frames of the first rate, and GLB holds none.
     """
-    if not (np.isfinite(fps) and fps > 0):
-        raise KumiteError(f"{recording.scene}: {fps} keys a second, expected more than 0")
+    fps = checked_fps(fps, f"{recording.scene}: keys a second")
     last = len(recording) - 1
     keys = last * fps / recording.fps
     if keys > MOST_FRAMES:

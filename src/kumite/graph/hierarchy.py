@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kumite.annotate.cycles import Cycles
-from kumite.clip import ClipSet, freeze
+from kumite.checks import freeze, names, number
+from kumite.clip import ClipSet
 from kumite.errors import KumiteError
 from kumite.graph.distance import PoseFeatures, pose_features
 from kumite.graph.table import ActionTable
@@ -41,7 +42,7 @@ class Targets:
     mark: np.ndarray  # [T] int64
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "label", tuple(self.label))
+        object.__setattr__(self, "label", names(self.label, "targets: labels", unlike=False))
         count = len(self.label)
         for name in ("start", "stop", "mark"):
             freeze(self, "targets", **{name: (np.int64, (count,))})
@@ -98,6 +99,9 @@ class Hierarchy:
 
     def __post_init__(self) -> None:
         m, t = len(self.cores), len(self.targets)
+        if m == 0:
+            raise KumiteError("hierarchy: no core motions; expected at least one cycle")
+        object.__setattr__(self, "alike", number(self.alike, "hierarchy: alike", least=0.0))
         for name in ("leave", "entry", "exit", "land"):
             freeze(self, "hierarchy", **{name: (np.int64, (m, t))})
         for name in ("entry_distance", "exit_distance"):

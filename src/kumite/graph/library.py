@@ -70,12 +70,15 @@ class Library:
                 raise KumiteError(f"library: {what} of {found} frames, clips of {frames}")
         first, last = self.table.first - 1, self.table.last  # actions enter at first - 1
         clip = self.clips.clip_of_frame
-        if np.any(last >= frames) or np.any(clip[first] != clip[last]):
+        if self.table.state_frame[-1] >= frames or np.any(last >= frames):
+            raise KumiteError("library: a state or an action is none of its frames")
+        if np.any(clip[first] != clip[last]):
             raise KumiteError("library: an action leaves its clip")
         if self.actions is not None:
             if not np.array_equal(self.actions.clip_start, self.clips.clip_start):
                 raise KumiteError("library: its actions are of other clips")
-            if np.any(self.actions.stop[self.action_of_stretch] - 1 != last):
+            mine = self.action_of_stretch
+            if np.any(mine < 0) or np.any(self.actions.stop[mine] - 1 != last):
                 raise KumiteError("library: a stretch is not an action")
         if self.preparing is not None:
             self.preparing.check(self.clips, len(self.table.first))
@@ -265,9 +268,9 @@ def _preparing_header(preparing: Preparing) -> dict[str, Any]:
 def _preparing(header: Any, part: Callable[[str], dict[str, Any]], fps: float) -> Preparing:
     return Preparing(
         Hierarchy(
-            cores=Cycles(label=tuple(header["cores"]), fps=fps, **part("cores")),
-            targets=Targets(label=tuple(header["targets"]), **part("targets")),
-            alike=float(header["alike"]),
+            cores=Cycles(label=header["cores"], fps=fps, **part("cores")),
+            targets=Targets(label=header["targets"], **part("targets")),
+            alike=header["alike"],
             **part("hierarchy"),
         ),
         **part("preparing"),
@@ -296,13 +299,11 @@ def load_library(path: Path | str) -> Library:
         return {k.removeprefix(dot): v for k, v in arrays.items() if k.startswith(dot)}
 
     try:
-        skeleton = Skeleton(
-            names=tuple(header["joint_names"]), roles=header["roles"], **part("skeleton")
-        )
+        skeleton = Skeleton(names=header["joint_names"], roles=header["roles"], **part("skeleton"))
         clips = ClipSet(
             skeleton=skeleton,
             fps=header["fps"],
-            names=tuple(header["clip_names"]),
+            names=header["clip_names"],
             **part("clips"),
         )
         return Library(
@@ -313,13 +314,11 @@ def load_library(path: Path | str) -> Library:
             header["report"],
             None
             if header["labels"] is None
-            else Actions(
-                label=tuple(header["labels"]), clip_start=clips.clip_start, **part("actions")
-            ),
+            else Actions(label=header["labels"], clip_start=clips.clip_start, **part("actions")),
             AvoidanceParts(clip_start=clips.clip_start, **part("avoidance")),
             None
             if header["preparing"] is None
             else _preparing(header["preparing"], part, clips.fps),
         )
-    except (KeyError, TypeError, ValueError, KumiteError) as error:
+    except files.UNREADABLE as error:
         raise KumiteError(f"{path}: damaged library ({error})") from None

@@ -17,7 +17,8 @@ from kumite.annotate import Strikes, only_blows
 from kumite.annotate.contacts import velocity
 from kumite.annotate.kinds import strike_directions
 from kumite.body import Body, lay_body
-from kumite.clip import LIMBS, ClipSet, freeze
+from kumite.checks import freeze
+from kumite.clip import LIMBS, ClipSet
 from kumite.errors import KumiteError
 from kumite.graph.hierarchy import ENTRY, RETURN, Hierarchy, Targets
 from kumite.kernels import passing as kernels
@@ -65,11 +66,7 @@ class Preparing:
 
     def __post_init__(self) -> None:
         cores, count = len(self.hierarchy.cores), len(self.hierarchy.targets)
-        # Not by freeze, which has a parameter of that name.
-        what = np.array(self.what, dtype=np.int32).reshape(-1)
-        what.flags.writeable = False
-        object.__setattr__(self, "what", what)
-        freeze(self, "preparing", found=(np.bool_, (count,)))
+        freeze(self, "preparing", what=(np.int32, ("L",)), found=(np.bool_, (count,)))
         for name in ("kind", "limb"):
             freeze(self, "preparing", **{name: (np.int32, (count,))})
         for name in ("reference", "contact", "past"):
@@ -82,10 +79,6 @@ class Preparing:
             ("a kind of target that is none", _within(self.kind, 0, len(KINDS))),
             ("a limb that is none", _within(self.limb, -1, len(LIMBS))),
             ("a strike without a limb", np.array_equal(strikes, self.limb != NO_LIMB)),
-            (
-                "a place that is not finite",
-                all(np.all(np.isfinite(x)) for x in (self.place, self.clear, self.way)),
-            ),
         ):
             if not fits:
                 raise KumiteError(f"preparing: {wrong}")

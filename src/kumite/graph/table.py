@@ -14,7 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kumite.clip import ClipSet, freeze
+from kumite.checks import freeze, rising
+from kumite.clip import ClipSet
 from kumite.errors import KumiteError
 from kumite.graph.transitions import Transitions
 from kumite.rotation import planar_compose, planar_inverse
@@ -36,22 +37,30 @@ class ActionTable:
     )  # [L, 3] (x, z, yaw) from the facing frame of first - 1 to that of last
 
     def __post_init__(self) -> None:
-        states, actions, stretches = len(self.state_frame), len(self.stretch), len(self.first)
-        freeze(
+        size = freeze(
             self,
             "action table",
-            state_frame=(np.int32, (states,)),
-            action_start=(np.int32, (states + 1,)),
-            stretch=(np.int32, (actions,)),
-            join_cost=(np.float32, (actions,)),
-            first=(np.int32, (stretches,)),
-            last=(np.int32, (stretches,)),
-            target=(np.int32, (stretches,)),
-            displacement=(float, (stretches, 3)),
+            state_frame=(np.int32, ("N",)),
+            action_start=(np.int32, ("N + 1",)),
+            stretch=(np.int32, ("A",)),
+            join_cost=(np.float32, ("A",)),
+            first=(np.int32, ("L",)),
+            last=(np.int32, ("L",)),
+            target=(np.int32, ("L",)),
+            displacement=(float, ("L", 3)),
         )
+        states, actions, stretches = size["N"], size["A"], size["L"]
+        if states == 0 or size["N + 1"] != states + 1:
+            raise KumiteError(
+                "action table: expected states, where the actions of each start, the end"
+            )
         # Kernels follow these numbers without looking: one that is out of range must not get there.
         for what, fits in (
-            ("a state without actions", np.all(np.diff(self.action_start) >= 1)),
+            (
+                "states whose frames are not in order",
+                self.state_frame[0] >= 0 and rising(self.state_frame),
+            ),
+            ("a state without actions", rising(self.action_start)),
             ("actions that no state has", self.action_start[[0, -1]].tolist() == [0, actions]),
             ("an action without a stretch", _within(self.stretch, stretches)),
             ("a stretch without frames", np.all((self.first >= 1) & (self.first <= self.last))),
@@ -60,7 +69,7 @@ class ActionTable:
                 _within(self.target, states)
                 and np.array_equal(self.state_frame[self.target], self.last),
             ),
-            ("a displacement that is not finite", np.all(np.isfinite(self.displacement))),
+            ("a join that costs less than nothing", np.all(self.join_cost >= 0)),
         ):
             if not fits:
                 raise KumiteError(f"action table: {what}")

@@ -24,7 +24,7 @@ import numpy as np
 
 from kumite import rotation
 from kumite.clip import NO_PARENT, Skeleton
-from kumite.errors import KumiteError, at, unknown
+from kumite.errors import KumiteError, at, told_of, unknown
 from kumite.kernels import parse
 from kumite.mocap import text
 from kumite.mocap.raw import RawMotion
@@ -253,13 +253,14 @@ def read_asf(path: Path | str) -> AsfSkeleton:
             offsets[j] = ends[parent]
     inner = set(parents)
     leaves = [j for j in range(1, len(bones)) if j not in inner and np.any(ends[j] != 0)]
-    skeleton = Skeleton(
-        tuple(b.name for b in bones),
-        np.array(parents),
-        offsets,
-        tip_parents=np.array(leaves, dtype=np.int32),
-        tip_offsets=ends[leaves].reshape(-1, 3),
-    )
+    with told_of(path):
+        skeleton = Skeleton(
+            tuple(b.name for b in bones),
+            np.array(parents),
+            offsets,
+            tip_parents=np.array(leaves, dtype=np.int32),
+            tip_offsets=ends[leaves].reshape(-1, 3),
+        )
     scale = 1.0 if asf.radians else np.pi / 180
     return AsfSkeleton(
         path,

@@ -16,7 +16,7 @@ import numpy as np
 
 from kumite import rotation
 from kumite.clip import NO_PARENT, Skeleton
-from kumite.errors import KumiteError, at
+from kumite.errors import KumiteError, at, told_of
 from kumite.kernels import parse
 from kumite.mocap import text
 from kumite.mocap.raw import RawMotion
@@ -338,13 +338,12 @@ def _assemble(
     names, renamed = _unique([j.name for j in joints])
     if renamed:
         notes.append(f"joint names used twice were numbered: {', '.join(renamed)}")
-    skeleton = Skeleton(
-        names,
-        parents,
-        offsets,
-        tip_parents=np.array([j for j, n in enumerate(joints) for _ in n.tips], dtype=np.int32),
-        tip_offsets=np.array([t for n in joints for t in n.tips], dtype=np.float64).reshape(-1, 3),
-    )
+    tip_parents = np.array([j for j, n in enumerate(joints) for _ in n.tips], dtype=np.int32)
+    tip_offsets = np.array([t for n in joints for t in n.tips], dtype=np.float64).reshape(-1, 3)
+    with told_of(path):
+        skeleton = Skeleton(
+            names, parents, offsets, tip_parents=tip_parents, tip_offsets=tip_offsets
+        )
     fps = text.rate_of(*frame_time)
     return RawMotion(path, skeleton, fps, True, root_position, wxyz, notes=tuple(notes))
 

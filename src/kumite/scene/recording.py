@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from kumite import files
+from kumite import checks, files
 from kumite.clip import Clip, Skeleton
 from kumite.errors import KumiteError, unknown
+from kumite.scene.told import check_event, check_settings
 
 KIND = "recording"
 VERSION = 2
@@ -29,6 +30,11 @@ class Event:
     kind: str  # decision, strike, hit, …
     character: str  # who acts
     data: Mapping[str, Any] = field(default_factory=dict)  # JSON values; SI units
+
+    def __post_init__(self) -> None:
+        checks.whole(self.frame, "event: frame", least=0)
+        checks.text(self.character, "event: character")
+        check_event(self.kind, self.data)
 
 
 @dataclass(frozen=True)
@@ -51,37 +57,43 @@ class Recording:
 
     def __post_init__(self) -> None:
         put = object.__setattr__
-        for name, dtype in (
-            ("root_position", np.float32),
-            ("wxyz", np.float32),
-            ("contacts", np.bool_),
-            ("library_frame", np.int32),
-            ("object_position", np.float32),
-        ):
-            array = np.ascontiguousarray(getattr(self, name), dtype=dtype)
-            put(self, name, array)
-        frames, count = self.root_position.shape[:2]
-        if self.object_position.size == 0:
-            put(self, "object_position", np.zeros((frames, len(self.objects), 3), np.float32))
-        expected = {
-            "root_position": (frames, len(self.names), 3),
-            "wxyz": (frames, count, len(self.skeleton), 4),
-            "contacts": (frames, count, 2),
-            "library_frame": (frames, count),
-            "object_position": (frames, len(self.objects), 3),
-        }
-        for name, shape in expected.items():
-            if getattr(self, name).shape != shape:
-                raise KumiteError(
-                    f"recording: {name} is {getattr(self, name).shape}, expected {shape}"
-                )
-        if self.rate is not None:
-            rate = np.ascontiguousarray(self.rate, dtype=np.float32)
-            put(self, "rate", rate)
-            if rate.shape != (frames, count):
-                raise KumiteError(f"recording: rate is {rate.shape}, expected {(frames, count)}")
+        checks.text(self.scene, "recording: scene")
+        checks.instance(self.skeleton, Skeleton, "recording: skeleton")
+        put(self, "fps", checks.fps(self.fps, "recording: fps"))
+        put(self, "names", checks.names(self.names, "recording: characters' names", least=1))
+        put(self, "objects", checks.names(self.objects, "recording: objects' names"))
+        count, joints, things = len(self.names), len(self.skeleton), len(self.objects)
+        shown = checks.array(
+            self.root_position, "recording: root_position", ("F", count, 3), np.float32
+        )
+        frames = len(shown)
         if frames == 0:
             raise KumiteError("recording: no frames")
+        if np.size(self.object_position) == 0:
+            put(self, "object_position", np.zeros((frames, things, 3), np.float32))
+        fields: dict[str, tuple[type, tuple[checks.Size, ...]]] = {
+            "root_position": (np.float32, (frames, count, 3)),
+            "wxyz": (np.float32, (frames, count, joints, 4)),
+            "contacts": (np.bool_, (frames, count, 2)),
+            "library_frame": (np.int32, (frames, count)),
+            "object_position": (np.float32, (frames, things, 3)),
+        }
+        if self.rate is not None:
+            fields["rate"] = (np.float32, (frames, count))
+        checks.freeze(self, "recording", **fields)
+        checks.unit_quaternions(self.wxyz, "recording: wxyz")
+        if self.library_frame.min() < NO_FRAME:
+            raise KumiteError("recording: library_frame: expected frames, or NO_FRAME")
+        put(self, "events", tuple(self.events))
+        for event in self.events:
+            checks.instance(event, Event, "recording: events")
+            if event.character not in self.names:
+                raise unknown("character of an event", event.character, self.names)
+            if event.frame > frames:
+                raise KumiteError(
+                    f"recording: an event in frame {event.frame}; expected 0 to {frames}"
+                )
+        check_settings(self.settings)
 
     def __len__(self) -> int:
         return len(self.root_position)
@@ -136,12 +148,12 @@ def skeleton_header(skeleton: Skeleton) -> dict[str, Any]:
 
 def skeleton_from_header(header: Mapping[str, Any]) -> Skeleton:
     return Skeleton(
-        tuple(header["names"]),
-        np.array(header["parents"]),
-        np.array(header["offsets"]),
+        header["names"],
+        header["parents"],
+        header["offsets"],
         header["roles"],
-        np.array(header["tip_parents"], dtype=np.int32),
-        np.array(header["tip_offsets"], dtype=np.float64).reshape(-1, 3),
+        header["tip_parents"],
+        header["tip_offsets"],
     )
 
 
@@ -175,15 +187,15 @@ def load_recording(path: Path | str) -> Recording:
             scene=header["scene"],
             fps=header["fps"],
             skeleton=skeleton_from_header(header["skeleton"]),
-            names=tuple(header["names"]),
-            objects=tuple(header["objects"]),
+            names=header["names"],
+            objects=header["objects"],
             events=events_from_header(header["events"]),
             settings=header["settings"],
             **arrays,
         )
-    except (KeyError, TypeError, ValueError, KumiteError) as error:
+    except files.UNREADABLE as error:
         raise KumiteError(f"{path}: damaged recording ({error})") from None
 
 
 def events_from_header(rows: Sequence[Sequence[Any]]) -> tuple[Event, ...]:
-    return tuple(Event(int(f), k, c, d) for f, k, c, d in rows)
+    return tuple(Event(f, k, c, d) for f, k, c, d in rows)

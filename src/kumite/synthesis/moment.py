@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kumite import rotation
-from kumite.clip import Skeleton, forward_kinematics, freeze
-from kumite.errors import KumiteError
+from kumite.checks import freeze
+from kumite.clip import Skeleton, forward_kinematics
 
 
 @dataclass(frozen=True)
@@ -21,18 +21,14 @@ class Moment:
     joint_velocity: np.ndarray  # [J, 3] rad/s, in each joint's own axes
 
     def __post_init__(self) -> None:
-        joints = len(self.wxyz)
         freeze(
             self,
             "moment",
             root_position=(float, (3,)),
-            wxyz=(float, (joints, 4)),
+            wxyz=(float, ("J", 4)),
             root_velocity=(float, (3,)),
-            joint_velocity=(float, (joints, 3)),
+            joint_velocity=(float, ("J", 3)),
         )
-        arrays = (self.root_position, self.wxyz, self.root_velocity, self.joint_velocity)
-        if not all(np.all(np.isfinite(a)) for a in arrays):
-            raise KumiteError("moment: a pose or velocity that is not finite")
 
     @staticmethod
     def between(root_position: np.ndarray, wxyz: np.ndarray, fps: float) -> Moment:

@@ -16,6 +16,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from kumite.annotate.contacts import Contacts
 from kumite.annotate.cycles import Cycles, closed
+from kumite.checks import freeze
 from kumite.clip import (
     SIDES,
     Clip,
@@ -23,7 +24,6 @@ from kumite.clip import (
     Skeleton,
     facing_frame,
     forward_kinematics,
-    freeze,
 )
 from kumite.errors import KumiteError, unknown
 from kumite.kernels import preparation as kernels

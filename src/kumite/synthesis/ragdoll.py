@@ -27,7 +27,8 @@ from scipy.interpolate import CubicSpline
 
 from kumite import rotation
 from kumite.body import Body
-from kumite.clip import SIDES, Skeleton, forward_kinematics, freeze
+from kumite.checks import freeze
+from kumite.clip import SIDES, Skeleton, forward_kinematics
 from kumite.errors import KumiteError
 from kumite.kernels.overlap import deepest_overlaps
 from kumite.synthesis import mjcf

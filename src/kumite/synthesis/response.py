@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kumite.clip import ClipSet, Skeleton, facing_frame, freeze
+from kumite.checks import freeze
+from kumite.clip import ClipSet, Skeleton, facing_frame
 from kumite.errors import KumiteError
 from kumite.rotation import from_yaw, planar_apply, planar_inverse, rotate, wrap_angle
 from kumite.synthesis.moment import Moment

@@ -1,0 +1,250 @@
+"""Checks at the door: what comes from outside is what it should be, or one sentence says it is not.
+
+Every check is told what it looks at ("clip 'walk': root_position") and returns the value as the
+code behind it wants it. Dataclasses check their fields when they are made, so that whoever holds
+one need not look again.
+"""
+
+from __future__ import annotations
+
+import numbers
+import operator
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeVar
+
+import numpy as np
+
+from kumite.errors import KumiteError
+
+T = TypeVar("T")
+Size = int | str  # of one axis of an array; a letter stands for any, the same one everywhere
+
+FAR = 1e9  # m, or units of a file: nobody and nothing is farther away
+UNIT_WITHIN = 1e-3  # by which a quaternion's length may differ from 1
+LONGEST_NAME = 1000  # characters
+LEAST_FPS, MOST_FPS = 0.001, 100_000.0  # frames a second
+_KINDS = {"f": "biuf", "i": "iu", "u": "iu", "b": "b"}  # of NumPy, that each may be made of
+_CALLED = {"f": "numbers", "i": "whole numbers", "u": "whole numbers", "b": "true or false"}
+
+
+def shown(value: object, longest: int = 60) -> str:
+    """A value for a message: short, on one line, whatever it is."""
+    try:
+        text = repr(value)
+    except Exception:  # an integer of too many digits; somebody's own __repr__
+        text = f"a {type(value).__name__}"
+    text = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
+    return text if len(text) <= longest else f"{text[: longest - 1]}…"
+
+
+def a(value: type | object) -> str:
+    """A type, or that of a value, with its article."""
+    name = value.__name__ if isinstance(value, type) else type(value).__name__
+    return "None" if name == "NoneType" else f"{'an' if name[0] in 'AEIOUaeio' else 'a'} {name}"
+
+
+def instance(value: object, kind: type[T] | tuple[type, ...], what: str) -> T:
+    """A value of a type, or of one of several. Errors: it is of another."""
+    if not isinstance(value, kind):
+        kinds = kind if isinstance(kind, tuple) else (kind,)
+        raise KumiteError(f"{what}: {a(value)}; expected {' or '.join(a(k) for k in kinds)}")
+    return value  # type: ignore[return-value]
+
+
+def number(
+    value: object,
+    what: str,
+    *,
+    least: float = -np.inf,
+    most: float = np.inf,
+    above: float = -np.inf,
+    unit: str = "",
+) -> float:
+    """A finite number, from least (or more than above) to most.
+
+    Errors: no number, NaN, infinite, out of range.
+    """
+    try:
+        if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
+            raise TypeError
+        found = float(value)
+    except (TypeError, ValueError, OverflowError):
+        found = np.nan
+    if not (np.isfinite(found) and least <= found <= most and found > above):
+        limits = [f"more than {above:g}"] if above > -np.inf else []
+        limits += [f"at least {least:g}"] if least > -np.inf else []
+        limits += [f"at most {most:g}"] if most < np.inf else []
+        wanted = " ".join(["a number", " and ".join(limits), unit]).replace("  ", " ").strip()
+        raise KumiteError(f"{what}: {shown(value)}; expected {wanted}")
+    return found
+
+
+def whole(value: object, what: str, *, least: int | None = None, most: int | None = None) -> int:
+    """A whole number, from least to most. Errors: no whole number; out of range."""
+    try:
+        if isinstance(value, bool | np.bool_):
+            raise TypeError
+        found = operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise KumiteError(f"{what}: {shown(value)}; expected a whole number") from None
+    low, high = (least if least is not None else found), (most if most is not None else found)
+    if not low <= found <= high:
+        limits = [f"at least {least}"] if least is not None else []
+        limits += [f"at most {most}"] if most is not None else []
+        raise KumiteError(f"{what}: {shown(value)}; expected {' and '.join(limits)}")
+    return found
+
+
+def fps(value: object, what: str) -> float:
+    """A frame rate. Errors: as :func:`number`."""
+    return number(value, what, above=LEAST_FPS, most=MOST_FPS, unit="frames a second")
+
+
+def text(value: object, what: str, *, longest: int = LONGEST_NAME) -> str:
+    """A name or a line of text.
+
+    Errors: no string; longer than that; control characters, which a terminal would obey; halves of
+    characters, which no file can hold.
+    """
+    if not isinstance(value, str):
+        raise KumiteError(f"{what}: {shown(value)}; expected text")
+    if len(value) > longest:
+        raise KumiteError(f"{what}: {len(value)} characters; expected at most {longest}")
+    if not value.isprintable() and any(is_control(c) for c in value):
+        raise KumiteError(f"{what}: {shown(value)}; expected no control characters")
+    return value
+
+
+def is_control(c: str) -> bool:
+    """Whether a character is a control character (C0, DEL, C1) or half of a surrogate pair."""
+    return c < " " or "\x7f" <= c <= "\x9f" or "\ud800" <= c <= "\udfff"
+
+
+def names(value: object, what: str, *, unlike: bool = True, least: int = 0) -> tuple[str, ...]:
+    """Names in order. Errors: no names; fewer than least; two alike, unless that is allowed."""
+    if isinstance(value, str) or not isinstance(value, Iterable):
+        raise KumiteError(f"{what}: {shown(value)}; expected names")
+    out = tuple(text(v, what) for v in value)
+    if len(out) < least:
+        raise KumiteError(f"{what}: {len(out)}; expected at least {least}")
+    if unlike and len(set(out)) != len(out):
+        seen: set[str] = set()
+        twice = sorted({n for n in out if n in seen or seen.add(n)})  # type: ignore[func-returns-value]
+        raise KumiteError(f"{what} used twice: {', '.join(twice[:10])}")
+    return out
+
+
+def mapping(value: object, what: str) -> Mapping[str, Any]:
+    """A mapping with names as keys. Errors: it is none."""
+    if not isinstance(value, Mapping):
+        raise KumiteError(f"{what}: {a(value)}; expected a mapping")
+    for key in value:
+        text(key, f"{what}: a key")
+    return value
+
+
+def array(
+    value: object,
+    what: str,
+    shape: tuple[Size | Any, ...],
+    dtype: type | np.dtype = float,
+    *,
+    least: float | None = None,
+    most: float | None = None,
+    finite: bool = True,
+) -> np.ndarray:
+    """An array of a shape and dtype, contiguous, its numbers finite and within least … most.
+
+    shape: a size or a letter (any size) an axis; a leading ``...`` stands for any axes before.
+    Errors: no array of numbers; another shape; numbers that the dtype cannot hold; out of range.
+    """
+    wanted = np.dtype(dtype)
+    try:
+        found = np.asarray(value)
+    except (TypeError, ValueError, OverflowError):  # rows of different lengths
+        raise KumiteError(f"{what}: {a(value)}; expected an array {_axes(shape)}") from None
+    if found.dtype.kind not in _KINDS[wanted.kind] and found.size:
+        raise KumiteError(
+            f"{what}: {found.dtype if found.dtype.kind not in 'OUS' else a(value)}; "
+            f"expected an array {_axes(shape)} of {_CALLED[wanted.kind]}"
+        )
+    if found.shape == (0,) and len(shape) > 1 and isinstance(shape[0], str):
+        found = np.zeros((0, *(s if isinstance(s, int) else 0 for s in shape[1:])))  # [] is none
+    _refuse_shape(found.shape, what, shape)
+    if found.size == 0:
+        return np.zeros(found.shape, wanted)
+    if wanted.kind in "iu" and not np.can_cast(found.dtype, wanted):
+        limits = np.iinfo(wanted)
+        low, high = int(found.min()), int(found.max())
+        if low < limits.min or high > limits.max:
+            wrong = low if low < limits.min else high
+            raise KumiteError(f"{what}: {wrong}; expected {limits.min} to {limits.max}")
+    with np.errstate(over="ignore", invalid="ignore"):
+        out = np.ascontiguousarray(found, dtype=wanted)
+    low, high = out.min(), out.max()  # NaN if any number is
+    if wanted.kind == "f" and finite and not (np.isfinite(low) and np.isfinite(high)):
+        place = np.unravel_index(int(np.argmin(np.isfinite(out))), out.shape)
+        where = f" at {[int(i) for i in place]}" if place else ""
+        raise KumiteError(f"{what}: {found[place]}{where}; expected finite numbers")
+    if least is not None and low < least:
+        raise KumiteError(f"{what}: {low}; expected at least {least:g}")
+    if most is not None and high > most:
+        raise KumiteError(f"{what}: {high}; expected at most {most:g}")
+    return out
+
+
+def rising(values: np.ndarray) -> bool:
+    """Whether whole numbers [N] rise from each to the next; np.diff would wrap."""
+    return bool(np.all(values[1:] > values[:-1]))
+
+
+def unit_quaternions(wxyz: np.ndarray, what: str) -> np.ndarray:
+    """Quaternions [..., 4] of unit length, as they are. Errors: one that is not."""
+    off = np.abs(np.einsum("...k,...k->...", wxyz, wxyz, dtype=np.float64) - 1.0)
+    if off.size and not off.max() <= 2 * UNIT_WITHIN:
+        place = np.unravel_index(int(np.argmax(off)), off.shape)
+        length = float(np.linalg.norm(wxyz[place].astype(np.float64)))
+        where = [int(i) for i in place]
+        raise KumiteError(f"{what}: a length of {length:g} at {where}; expected unit quaternions")
+    return wxyz
+
+
+def read_only(array: np.ndarray, given: object) -> np.ndarray:
+    """An array that nobody writes to: a copy where it is the one that was given."""
+    if array.flags.writeable:
+        array = array.copy() if array is given else array
+        array.flags.writeable = False
+    return array
+
+
+def freeze(
+    record: object, what: str, finite: bool = True, /, **fields: tuple[type, tuple[Size, ...]]
+) -> dict[str, int]:
+    """Check a frozen dataclass' arrays, and make them read-only, in place.
+
+    fields: name=(dtype, shape), shapes as their comments say: ``("F", 3)``. A letter is the same
+    size in all of them. Numbers must be within ±``FAR``, or with ``finite`` False may be anything.
+    Returns the letters' sizes. Errors: as :func:`array`, told as ``what``'s.
+    """
+    sizes: dict[str, int] = {}
+    for name, (dtype, shape) in fields.items():
+        given = getattr(record, name)
+        wanted = tuple(sizes.get(s, s) if isinstance(s, str) else s for s in shape)
+        far = FAR if finite and np.dtype(dtype).kind == "f" else None
+        least = None if far is None else -far
+        out = array(given, f"{what}: {name}", wanted, dtype, finite=finite, least=least, most=far)
+        sizes.update({s: n for s, n in zip(shape, out.shape) if isinstance(s, str)})
+        object.__setattr__(record, name, read_only(out, given))
+    return sizes
+
+
+def _refuse_shape(found: tuple[int, ...], what: str, shape: tuple[Size | Any, ...]) -> None:
+    open_ = bool(shape) and shape[0] is ...
+    wanted = shape[1:] if open_ else shape
+    tail = found[len(found) - len(wanted) :] if open_ else found
+    if len(tail) != len(wanted) or any(isinstance(w, int) and n != w for n, w in zip(tail, wanted)):
+        raise KumiteError(f"{what} is {list(found)}, expected {_axes(shape)}")
+
+
+def _axes(shape: tuple[Size | Any, ...]) -> str:
+    return "[" + ", ".join("…" if s is ... else str(s) for s in shape) + "]"
