@@ -309,6 +309,10 @@ def studio(
     port: Annotated[
         int | None, typer.Option(min=0, max=65535, help="Port; 0 takes any free one.")
     ] = None,
+    allow_host: Annotated[
+        list[str] | None,
+        typer.Option(help="Another name that the page is asked for as, of a proxy or a tunnel."),
+    ] = None,
     seconds: Annotated[float | None, typer.Option(help="End by itself after this time.")] = None,
     browser: Annotated[bool, typer.Option(help="Open a browser where there is one.")] = True,
 ) -> None:
@@ -328,6 +332,7 @@ def studio(
         host=host,
         port=8080 if port is None else port,
         strict_port=port is not None,
+        allowed=allow_host or (),
         open_browser=browser,
         seconds=seconds,
         announce=lambda line: out.print(line, markup=False, highlight=False),

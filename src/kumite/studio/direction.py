@@ -14,9 +14,11 @@ from kumite.control.routes import through
 from kumite.errors import KumiteError
 from kumite.scene import BoutScene
 from kumite.scene.controls import OrderControl, StyleControl, heed
+from kumite.studio.doors import Safely, a_place, a_way, within
 from kumite.studio.paths import Sketch, on_floor
 
 DRAW, FINISH, CLEAR = "Draw path", "Finish", "Clear"
+LONGEST = 3600.0  # s that a drawn path may take
 TICK = "✓ "
 ORDER_NAMES = {
     "wanted": ("A⁺ wanted", "kinds and labels that score; choose one to add or take away"),
@@ -28,7 +30,6 @@ UNITS = {
     "preferred_facing": "°",
     "preferred_heading": "°",
 }
-Safely = Callable[[Callable[[Any], None]], Callable[[Any], None]]
 
 
 class Director(Protocol):
@@ -68,7 +69,12 @@ class Direction:
         fighter.on_update(safely(self._choose))
         with gui.add_folder("Path"):
             self._seconds = gui.add_number(
-                "Seconds", 0.0, min=0.0, step=1.0, hint="for a path that is drawn; 0: no times"
+                "Seconds",
+                0.0,
+                min=0.0,
+                max=LONGEST,
+                step=1.0,
+                hint="for a path that is drawn; 0: no times",
             )
             path = gui.add_button_group("", (DRAW, FINISH, CLEAR))
             path.on_click(safely(self._draw))
@@ -99,7 +105,7 @@ class Direction:
         def tune(event: Any) -> None:
             if event.client is None:  # the panel writes to its sliders, too
                 return
-            value = float(event.target.value)
+            value = within(field, event.target.value, event.target.min, event.target.max)
             self._director.direct(lambda: self._control(field).set(value))
             self._refresh(besides=slider)
 
@@ -180,17 +186,14 @@ class Direction:
             self._on_floor = None
 
     def _add_point(self, event: Any) -> None:
-        origin = self._director.from_page(event.ray_origin)
-        end = self._director.from_page(
-            [o + d for o, d in zip(event.ray_origin, event.ray_direction)]
-        )
-        place = on_floor(origin, end - origin)
+        origin = self._director.from_page(a_place("click", event.ray_origin))
+        place = on_floor(origin, a_way("click", event.ray_direction))
         if place is not None:
-            self._director.direct(lambda: self._sketch.places.append(place))
+            self._director.direct(lambda: self._sketch.add(place))
             self.show()
 
     def _finish(self, event: Any) -> None:
-        seconds = float(self._seconds.value) or None
+        seconds = within("seconds", self._seconds.value, 0.0, LONGEST) or None
         said = self._director.direct(lambda: self._set_route(seconds))
         self._listen(False)
         self._refresh()

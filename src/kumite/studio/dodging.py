@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Protocol
 
-import numpy as np
 import viser
 
+from kumite.studio.doors import Safely, a_place, a_way
 from kumite.studio.throwing import FASTEST, LARGEST, SLOWEST, SMALLEST, Throws
 from kumite.studio.volumes import Volumes
-
-Safely = Callable[[Callable[[Any], None]], Callable[[Any], None]]
 
 
 class Thrower(Protocol):
@@ -52,11 +50,11 @@ class Dodging:
             speed = gui.add_slider(
                 "Ball speed [m/s]", SLOWEST, FASTEST, step=0.5, initial_value=throws.speed
             )
-            speed.on_update(safely(lambda e: setattr(throws, "speed", float(e.target.value))))
+            speed.on_update(safely(lambda e: throws.set_speed(e.target.value)))
             radius = gui.add_slider(
                 "Ball radius [m]", SMALLEST, LARGEST, step=0.01, initial_value=throws.radius
             )
-            radius.on_update(safely(lambda e: setattr(throws, "radius", float(e.target.value))))
+            radius.on_update(safely(lambda e: throws.set_radius(e.target.value)))
             one = gui.add_button("Throw one by itself", hint="from before somebody, at a body part")
             one.on_click(safely(self._one))
             self._stream = gui.add_checkbox(
@@ -79,10 +77,8 @@ class Dodging:
         server.scene.on_click()(safely(self._click))
 
     def _click(self, event: viser.SceneClickEvent) -> None:
-        eye = np.asarray(event.ray_origin, dtype=np.float64)
-        end = self._studio.from_page(eye + np.asarray(event.ray_direction))
-        eye = self._studio.from_page(eye)
-        self._throws.click(eye, end - eye)
+        way = a_way("click", event.ray_direction)  # the page's world is not turned
+        self._throws.click(self._studio.from_page(a_place("click", event.ray_origin)), way)
         self._studio.wake()
 
     def _one(self, event: Any) -> None:

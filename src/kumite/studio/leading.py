@@ -13,6 +13,7 @@ import numpy as np
 
 from kumite.rotation import from_yaw, rotate
 from kumite.scene import PrepareScene, SceneObject
+from kumite.studio.doors import a_place
 from kumite.studio.paths import on_floor
 
 NEAR = 0.4  # m from a thing's surface to a ray that means it
@@ -66,7 +67,7 @@ def way_seen(eye: np.ndarray, look_at: np.ndarray, up: np.ndarray, key: str) -> 
     ahead = (look_at - eye)[[0, 2]]
     if np.hypot(*ahead) < 1e-3 * np.linalg.norm(look_at - eye):
         ahead = up[[0, 2]]
-    ahead = ahead / np.hypot(*ahead)
+    ahead = ahead / max(float(np.hypot(*ahead)), 1e-9)  # straight down with no side up: nowhere
     forward, right = WAYS[key]
     return forward * ahead + right * np.array([-ahead[1], ahead[0]])
 
@@ -94,7 +95,8 @@ class Leader:
         if isinstance(what, str):
             scene.go_to(self.who, what)
         elif what is not None:
-            scene.go(self.who, np.array(what))
+            x, _, z = a_place("goal", [what[0], 0.0, what[1]])
+            scene.go(self.who, np.array([x, z]))
 
     def press(self, eye: np.ndarray, look_at: np.ndarray, up: np.ndarray, key: str) -> None:
         """Send it into the direction of an arrow as a camera sees it."""

@@ -6,6 +6,8 @@ import math
 import time
 from collections.abc import Callable
 
+from kumite.errors import KumiteError
+
 MAX_DEBT = 0.25  # s behind before the clock starts anew: slow motion instead of a freeze
 LEAST_DRAWN = 15  # pictures a second to keep up while frames are made too slowly
 
@@ -26,6 +28,8 @@ class Pace:
 
     @speed.setter
     def speed(self, speed: float) -> None:
+        if not 0.0 < speed < math.inf:
+            raise KumiteError(f"speed {speed}: expected a finite number above 0")
         self._speed = speed
         self.restart()
 

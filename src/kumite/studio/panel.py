@@ -7,12 +7,12 @@ from typing import Any, Protocol, runtime_checkable
 
 import viser
 
-from kumite.errors import KumiteError
 from kumite.scene.actions import ActionPlayback
 from kumite.scene.bout import BoutScene
 from kumite.studio.action_list import ActionList
 from kumite.studio.direction import Direction, Director
 from kumite.studio.dodging import Dodging, Thrower
+from kumite.studio.doors import LARGEST_SEED, safely, within
 from kumite.studio.leading import Leader
 from kumite.studio.paths import Sketch
 from kumite.studio.reference import Prepared
@@ -115,34 +115,36 @@ class Panel:
         gui.main_panel.set_width(WIDTH)
 
         self._play = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE, hint="space")
-        self._play.on_click(_safely(lambda _: desk.toggle()))
+        self._play.on_click(safely(lambda _: desk.toggle()))
         more = gui.add_button_group("", ("Step", "Restart"), hint="N: one frame on · R: restart")
         more.on_click(
-            _safely(lambda e: desk.step_once() if e.target.value == "Step" else desk.restart())
+            safely(lambda e: desk.step_once() if e.target.value == "Step" else desk.restart())
         )
         speed = gui.add_slider("Speed", SLOWEST, FASTEST, step=0.1, initial_value=1.0)
-        speed.on_update(_safely(lambda e: desk.set_speed(e.target.value)))
+        speed.on_update(safely(lambda e: desk.set_speed(e.target.value)))
         self._timeline: viser.GuiSliderHandle[float] | None = None
         if frames is None:
-            number = gui.add_number("Seed", seed, min=0, step=1, hint="restarts")
-            number.on_update(_safely(lambda e: desk.restart(int(e.target.value))))
+            number = gui.add_number(
+                "Seed", seed, min=0, max=max(seed, LARGEST_SEED), step=1, hint="restarts"
+            )
+            number.on_update(safely(lambda e: desk.restart(int(e.target.value))))
         else:
             last = _last(frames, fps)
             self._timeline = gui.add_slider("Time", 0.0, last, step=1 / fps, initial_value=0.0)
-            self._timeline.on_update(_safely(lambda e: _seek(desk, e, fps)))
+            self._timeline.on_update(safely(lambda e: _seek(desk, e, fps)))
         follow = gui.add_checkbox("Follow", True, hint="keep the fighters in the middle")
-        follow.on_update(_safely(lambda e: desk.set_follow(e.target.value)))
+        follow.on_update(safely(lambda e: desk.set_follow(e.target.value)))
         self._clock = gui.add_html("")
         self._dodging: Dodging | None = None
         if throws is not None and volumes is not None:
-            self._dodging = Dodging(server, throws, volumes, desk, _safely)
+            self._dodging = Dodging(server, throws, volumes, desk, safely)
         self._walking: Walking | None = None
         if leader is not None and prepared is not None:
-            self._walking = Walking(server, leader, prepared, desk, _safely)
+            self._walking = Walking(server, leader, prepared, desk, safely)
         self._direction: Direction | None = None
         if fight is not None and sketch is not None:
             with gui.add_folder("Direction"):
-                self._direction = Direction(server, fight, sketch, desk, _safely)
+                self._direction = Direction(server, fight, sketch, desk, safely)
         elif controls:
             with gui.add_folder("Parameters", expand_by_default=throws is None):
                 for control in controls:
@@ -151,7 +153,7 @@ class Panel:
         if actions is not None:
             with gui.add_folder("Actions"):
                 listed = ActionList(gui, actions, desk.choose)
-                listed.listen(_safely)
+                listed.listen(safely)
             _add_keys(gui, _moves(listed))
         else:
             with gui.add_folder("Score"):
@@ -160,7 +162,7 @@ class Panel:
             self._lines = gui.add_html("")
             if actions is None:
                 decisions = gui.add_checkbox("Decisions", False, hint="list every decision as well")
-                decisions.on_update(_safely(lambda e: desk.show_decisions(e.target.value)))
+                decisions.on_update(safely(lambda e: desk.show_decisions(e.target.value)))
         _add_keys(gui, _runs(desk))
 
     def set_length(self, frames: int) -> None:
@@ -210,7 +212,7 @@ def _last(frames: int, fps: float) -> float:
 def _seek(desk: Desk, event: Any, fps: float) -> None:
     # The studio moves the slider too; only a person's move is a wish.
     if event.client is not None:
-        desk.seek(round(event.target.value * fps))
+        desk.seek(round(within("time", event.target.value, 0.0, event.target.max) * fps))
 
 
 def _add_control(gui: viser.GuiApi, desk: Desk, control: Control) -> None:
@@ -222,7 +224,7 @@ def _add_control(gui: viser.GuiApi, desk: Desk, control: Control) -> None:
         step=getattr(control, "step", span / 100 if span > 0 else 1.0),
         initial_value=control.value,
     )
-    slider.on_update(_safely(lambda e: desk.tune(control, float(e.target.value))))
+    slider.on_update(safely(lambda e: desk.tune(control, float(e.target.value))))
 
 
 Keys = tuple[tuple[str, Any, Callable[[], None]], ...]
@@ -245,18 +247,4 @@ def _moves(listed: ActionList) -> Keys:
 
 def _add_keys(gui: viser.GuiApi, keys: Keys) -> None:
     for label, key, act in keys:
-        gui.add_command(label, hotkey=key).on_trigger(_safely(lambda _, act=act: act()))
-
-
-def _safely(act: Callable[[Any], None]) -> Callable[[Any], None]:
-    """Tell the page what could not be done, instead of a traceback in the terminal."""
-
-    def callback(event: Any) -> None:
-        try:
-            act(event)
-        except KumiteError as error:
-            if event.client is None:
-                raise
-            event.client.add_notification("Not possible", str(error), color="red")
-
-    return callback
+        gui.add_command(label, hotkey=key).on_trigger(safely(lambda _, act=act: act()))

@@ -11,8 +11,11 @@ import viser
 from kumite.body import main_colours, mix
 from kumite.control import Route
 from kumite.control.routes import through
+from kumite.errors import KumiteError
+from kumite.studio.doors import a_place, a_way, safely
 from kumite.studio.ring import STAGE
 
+MOST_POINTS = 200  # of a path that is drawn
 LIFT = 0.012  # m above the floor
 LINE_WIDTH = 0.03  # m
 SIDES = 36  # of a disc
@@ -29,6 +32,13 @@ class Sketch:
 
     def begin(self, who: int) -> None:
         self.who, self.places = who, []
+
+    def add(self, place: tuple[float, float]) -> None:
+        """One more check point. Errors: it is too far away, or one too many."""
+        if len(self.places) >= MOST_POINTS:
+            raise KumiteError(f"a path of {MOST_POINTS} check points already; expected 'Finish'")
+        x, _, z = a_place("check point", [place[0], 0.0, place[1]]).tolist()
+        self.places.append((x, z))
 
     def end(self) -> None:
         self.who, self.places = None, []
@@ -137,7 +147,7 @@ class Paths:
             cast_shadow=False,
             receive_shadow=False,
         )
-        discs.on_drag(lambda event: self._drag(who, event))
+        discs.on_drag(safely(lambda event: self._drag(who, event)))
         self._handles[who] = [discs]
         if count > 1:
             line = self._scene.add_line_segments(
@@ -149,8 +159,9 @@ class Paths:
         self.held = event.phase != "end"
         if event.instance_index is None:
             return
-        eye = np.asarray(event.client.camera.position, dtype=np.float64)
-        self._moved(who, event.instance_index, eye, np.asarray(event.end_position) - eye)
+        eye = a_place("camera", event.client.camera.position)
+        way = a_way("drag", np.asarray(event.end_position) - eye)
+        self._moved(who, event.instance_index, eye, way)
 
 
 def _segments(place: np.ndarray) -> np.ndarray:

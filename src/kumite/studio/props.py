@@ -11,6 +11,7 @@ from kumite.body import RGB, mix
 from kumite.rotation import from_yaw
 from kumite.scene.look import Part, shown
 from kumite.scene.stage import SceneObject, in_sight
+from kumite.studio.doors import a_place, a_way, safely
 from kumite.studio.ring import STAGE
 
 TARGET_COLOUR: RGB = (246, 196, 60)
@@ -59,10 +60,10 @@ class Targets:
     ) -> None:
         def drag(event: viser.SceneNodeDragEvent) -> None:
             (self._held.discard if event.phase == "end" else self._held.add)(index)
-            eye = np.asarray(event.client.camera.position, dtype=np.float64)
-            dragged(name, eye, np.asarray(event.end_position) - eye)
+            eye = a_place("camera", event.client.camera.position)
+            dragged(name, eye, a_way("drag", np.asarray(event.end_position) - eye))
 
-        self._shown[index].on_drag(drag)
+        self._shown[index].on_drag(safely(drag))
 
     def _add_gizmo(
         self,
@@ -79,14 +80,14 @@ class Targets:
             position=thing.position,
         )
 
-        @gizmo.on_update
-        def _(event: viser.TransformControlsEvent) -> None:
+        def drag(event: viser.TransformControlsEvent) -> None:
             if event.phase == "start":
                 self._held.add(index)
             elif event.phase == "end":
                 self._held.discard(index)
             moved(thing.name, np.array(event.target.position, dtype=np.float64))
 
+        gizmo.on_update(safely(drag))
         return gizmo
 
     @property

@@ -2,7 +2,7 @@
 
 viser listens on every interface by default, prints a banner, tries a thousand ports on any error
 and offers a public tunnel. The studio listens where it is told and nowhere else, says one line,
-and refuses the tunnel.
+refuses the tunnel, and lets in its own page only (:mod:`kumite.studio.gate`).
 """
 
 from __future__ import annotations
@@ -11,12 +11,13 @@ import contextlib
 import ipaddress
 import logging
 import socket
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import rich
 import viser
 
 from kumite.errors import KumiteError
+from kumite.studio.gate import Gate, guarding
 
 PORTS_TRIED = 100
 
@@ -90,14 +91,31 @@ def free_port(host: str, port: int | None, *, strict: bool = False) -> int:
 
 
 def open_server(
-    host: str, port: int | None, label: str, *, strict: bool = False
+    host: str,
+    port: int | None,
+    label: str,
+    *,
+    strict: bool = False,
+    allowed: Sequence[str] = (),
 ) -> viser.ViserServer:
-    """A running server; its real port is ``server.get_port()``. Errors as :func:`free_port`."""
+    """A running server; its real port is ``server.get_port()``.
+
+    allowed: names besides ``host`` that it may be asked for as. Errors as :func:`free_port`, and
+    names that are none.
+    """
+    gate = Gate(host, allowed)
     wanted = free_port(host, port, strict=strict)
     # A browser that closes its tab mid-handshake is no event worth a traceback.
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
-    with quiet_viser():
+    with quiet_viser(), guarding(gate, host, wanted):
         server = LocalServer(host=host, port=wanted, label=label, verbose=False)
+    if not gate.installed:
+        close_server(server)
+        raise KumiteError(
+            f"viser {viser.__version__} opens its server in an unknown way, so that it cannot be "
+            "guarded; expected the version in constraints.txt"
+        )
+    gate.server = server
     if strict and wanted and server.get_port() != wanted:  # taken between the probe and the bind
         close_server(server)
         raise KumiteError(f"port {wanted} on {host} is taken; choose another, or 0 for any free")

@@ -12,7 +12,7 @@ import sys
 import threading
 import time
 import webbrowser
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -28,6 +28,7 @@ from kumite.scene.prepare import PrepareScene
 from kumite.scene.recording import Event
 from kumite.scene.stage import Playback, Stage, in_sight
 from kumite.studio import bodies, props, ring
+from kumite.studio.doors import a_place, a_seed, within
 from kumite.studio.leading import Leader
 from kumite.studio.pace import Pace
 from kumite.studio.panel import FASTEST, SLOWEST, Control, Panel
@@ -63,6 +64,7 @@ class _Picture:
 class Studio:
     """A stage in the browser. Make it, :meth:`run` it, :meth:`close` it.
 
+    allowed: names besides ``host`` that the page may be asked for as (of a proxy or a tunnel).
     Errors: no body can be laid on the skeleton; a host that is not this machine's; with
     ``strict_port`` a port that is taken (without, the next free one is used).
     """
@@ -74,6 +76,7 @@ class Studio:
         host: str = "127.0.0.1",
         port: int | None = 8080,
         strict_port: bool = False,
+        allowed: Sequence[str] = (),
     ) -> None:
         self.stage = stage
         self._lock = threading.RLock()
@@ -86,7 +89,7 @@ class Studio:
         self._pace = Pace(stage.fps)
         self._log = EventLog(stage.names, dodging=is_dodging(stage), preparing=is_preparing(stage))
         mesh = body_mesh(stage.skeleton)
-        self.server = open_server(host, port, stage.title, strict=strict_port)
+        self.server = open_server(host, port, stage.title, strict=strict_port, allowed=allowed)
         self.url = url_of(host, self.server.get_port())
         try:
             self._build(mesh)
@@ -174,8 +177,9 @@ class Studio:
 
     def restart(self, seed: int | None = None) -> None:
         """From the start, with ``seed`` or the stage's own."""
+        seed = self.stage.seed if seed is None else a_seed(seed)
         with self._lock:
-            self.stage.reset(self.stage.seed if seed is None else seed)
+            self.stage.reset(seed)
             self._after_jump()
             self._rewound = True
         self.wake()
@@ -208,7 +212,7 @@ class Studio:
     def set_speed(self, speed: float) -> None:
         """Seconds of the scene in a second of wall time, 0.1 to 4."""
         with self._lock:
-            self._pace.speed = float(np.clip(speed, SLOWEST, FASTEST))
+            self._pace.speed = within("speed", speed, SLOWEST, FASTEST)
         self._wake.set()
 
     def set_follow(self, on: bool) -> None:
@@ -224,6 +228,7 @@ class Studio:
 
     def tune(self, control: Control, value: float) -> None:
         """Set one of the stage's controls."""
+        value = within(control.name, value, control.minimum, control.maximum)
         with self._lock:
             control.set(value)
 
@@ -250,7 +255,8 @@ class Studio:
             self.move_object(name, np.array([place[0], level, place[1]]))
 
     def move_object(self, name: str, position: np.ndarray) -> None:
-        """Put an object at ``position`` [3] m."""
+        """Put an object at ``position`` [3] m. Errors: it is not finite, or far away."""
+        position = a_place(name, position)
         with self._lock:
             self.stage.move_object(name, position)
         self.wake()
@@ -421,6 +427,7 @@ def serve(
     open_browser: bool = True,
     seconds: float | None = None,
     strict_port: bool = False,
+    allowed: Sequence[str] = (),
     announce: Callable[[str], None] = print,
 ) -> None:
     """Show a stage in the browser until Ctrl-C, or for ``seconds``.
@@ -430,7 +437,7 @@ def serve(
     """
     if seconds is not None and not seconds > 0:
         raise KumiteError(f"{seconds} seconds of studio; expected more than 0")
-    studio = Studio(stage, host=host, port=port, strict_port=strict_port)
+    studio = Studio(stage, host=host, port=port, strict_port=strict_port, allowed=allowed)
     try:
         found = studio.server.get_port()
         if port and found != port:

@@ -16,6 +16,7 @@ import numpy as np
 
 from kumite.errors import KumiteError
 from kumite.scene import DodgeScene
+from kumite.studio.doors import within
 
 SLOWEST, FASTEST = 4.0, 40.0  # m/s
 SMALLEST, LARGEST = 0.03, 0.4  # m
@@ -81,6 +82,12 @@ class Throws:
 
     def __post_init__(self) -> None:
         self.radius = float(np.clip(self.scene.balls_settings.radius, SMALLEST, LARGEST))
+
+    def set_speed(self, speed: float) -> None:
+        self.speed = within("ball speed", speed, SLOWEST, FASTEST)
+
+    def set_radius(self, radius: float) -> None:
+        self.radius = within("ball radius", radius, SMALLEST, LARGEST)
 
     def click(self, eye: np.ndarray, way: np.ndarray) -> None:
         """A ray [3], [3] on the stage was clicked. Any thread."""

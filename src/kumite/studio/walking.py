@@ -6,10 +6,10 @@ import html
 from collections.abc import Callable
 from typing import Any, cast
 
-import numpy as np
 import viser
 
-from kumite.studio.dodging import Safely, Thrower
+from kumite.studio.dodging import Thrower
+from kumite.studio.doors import Safely, a_place, a_way
 from kumite.studio.leading import DOWN, LEFT, RIGHT, UP, Leader
 from kumite.studio.reference import Prepared, State
 
@@ -101,16 +101,16 @@ class Walking:
         self._studio.wake()
 
     def _click(self, event: viser.SceneClickEvent) -> None:
-        eye = np.asarray(event.ray_origin, dtype=np.float64)
-        end = self._studio.from_page(eye + np.asarray(event.ray_direction))
-        eye = self._studio.from_page(eye)
-        self._studio.direct(lambda: self._leader.point(eye, end - eye))
+        eye = self._studio.from_page(a_place("click", event.ray_origin))
+        way = a_way("click", event.ray_direction)
+        self._studio.direct(lambda: self._leader.point(eye, way))
 
     def _press(self, event: Any, way: str) -> None:
         if event.client is None:
             return
         camera = event.client.camera
-        eye, at, up = (np.array(x) for x in (camera.position, camera.look_at, camera.up_direction))
+        eye, at = (a_place("camera", x) for x in (camera.position, camera.look_at))
+        up = a_way("camera", camera.up_direction)
         self._studio.direct(lambda: self._leader.press(eye, at, up, way))
 
     def _do(self, event: Any, motion: str) -> None:
