@@ -22,7 +22,7 @@ import socket
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import viser
 import websockets.asyncio.server
@@ -36,9 +36,11 @@ MOST_PAGES = 24  # at once
 MOST_CONNECTIONS = 96  # with those that only load the page
 LARGEST_MESSAGE = 16 * 1024  # bytes
 RATE, BURST = 120.0, 240.0  # messages a second, and at once; what comes faster waits its turn
-FRAME_RATE, FRAMES = 500.0, 3000.0  # as above, of all frames; who sends more is let go
+LONGEST_WAIT = 2.0  # s of waiting without a pause; who has still more to say then is let go
+FRAME_RATE, FRAMES = 300.0, 1000.0  # as above, of all frames; who sends more is let go
 MOST_STALE = 1000  # messages for nothing a page, a slow one in a busy studio
 MOST_LINES = 20  # of a log, about all strangers together
+CLOSE_TIMEOUT = 1.0  # s that who is let go has to say goodbye
 READY_PERIOD = 0.02  # s between looks at a studio that is being built
 
 log = logging.getLogger("kumite.studio")
@@ -204,6 +206,7 @@ class GuardedConnection(ServerConnection):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._left, self._at, self._stale = BURST, time.monotonic(), 0
+        self._waited = 0.0
         self._frames, self._framed_at = FRAMES, self._at
         inside = self.gate.enter()
         super().connection_made(transport)
@@ -220,16 +223,17 @@ class GuardedConnection(ServerConnection):
         now = time.monotonic()
         self._frames = min(FRAMES, self._frames + (now - self._framed_at) * FRAME_RATE) - 1.0
         self._framed_at = now
-        if self._frames < 0.0:
+        if self._frames >= 0.0:
+            super().process_event(event)
+        elif not self.transport.is_closing():
             self.transport.abort()
             self.gate.say("let a page go: it talks too fast")
-        else:
-            super().process_event(event)
 
     async def recv(self, decode: bool | None = None) -> Any:
         """The next message that a page may send; who sends another is let go."""
         while True:
-            await self._wait_for_turn()
+            if await self._waits_too_long():
+                await self._let_go("it talks too fast")
             raw = await super().recv(decode)
             while self.gate.server is None:
                 await asyncio.sleep(READY_PERIOD)
@@ -243,15 +247,26 @@ class GuardedConnection(ServerConnection):
                 reason = "too many messages for what is not there"
             except Refused as error:
                 reason = str(error)
-            self.gate.say(f"let a page go: {reason}")
-            await self.close(1008, "refused")
+            await self._let_go(reason)
 
-    async def _wait_for_turn(self) -> None:
+    async def _let_go(self, reason: str) -> NoReturn:
+        """Close, and read no more: of what else it sent nothing is looked at."""
+        self.gate.say(f"let a page go: {reason}")
+        await self.close(1008, "refused")
+        raise self.protocol.close_exc
+
+    async def _waits_too_long(self) -> bool:
+        """Wait for the turn of the next message; True if there was no pause for long."""
         now = time.monotonic()
         self._left = min(BURST, self._left + (now - self._at) * RATE) - 1.0
         self._at = now
-        if self._left < 0.0:
-            await asyncio.sleep(-self._left / RATE)
+        if self._left >= 0.0:
+            self._waited = 0.0
+            return False
+        pause = -self._left / RATE
+        self._waited += pause
+        await asyncio.sleep(pause)
+        return self._waited > LONGEST_WAIT
 
 
 @contextlib.contextmanager
@@ -305,6 +320,7 @@ def _guarded(gate: Gate, options: dict[str, Any]) -> dict[str, Any]:
         "process_response": process_response,
         "create_connection": kind,
         "max_size": LARGEST_MESSAGE,
+        "close_timeout": CLOSE_TIMEOUT,
     }
 
 

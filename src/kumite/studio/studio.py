@@ -14,6 +14,7 @@ import time
 import webbrowser
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,7 @@ from kumite.studio.throwing import Throws
 from kumite.studio.volumes import VolumePicture, Volumes
 from kumite.studio.wording import LANDED, EventLog, is_dodging, is_preparing, place, struck
 
+FIRST_RECORDING = FilePath(__file__).with_name("sparring.rec")  # shown while a scene is prepared
 MOST_DRAWN = 60.0  # pictures a second
 PANEL_PERIOD = 0.2  # s between updates of what is read, not watched
 IDLE_PERIOD = 0.25  # s between looks at a paused stage
