@@ -15,7 +15,7 @@ from kumite.clip import forward_kinematics
 from kumite.errors import KumiteError
 from kumite.mocap.asfamc import read_amc, read_asf
 from kumite.mocap.bvh import read_bvh
-from kumite.mocap.raw import RawMotion
+from kumite.mocap.raw import MOST_JOINTS, RawMotion, Stretch
 
 ASF = """# made by hand
 :version 1.10
@@ -244,13 +244,25 @@ def test_root_position_and_rate(tmp_path: Path) -> None:
     assert given_rate.fps == 30
 
 
+def test_the_users_rate_beats_a_broken_one(tmp_path: Path) -> None:
+    with pytest.raises(KumiteError, match="else say --file-fps, or file_fps in"):
+        read(tmp_path, amc=AMC.replace("SECOND 60", "SECOND 0"))
+    raw = read_amc(tmp_path / "small.amc", read_asf(tmp_path / "small.asf"), fps=50)
+    assert raw.fps == 50
+
+
+def test_one_frame_beside_the_range_is_said(tmp_path: Path) -> None:
+    raw = read(tmp_path, amc=":FRAME-RANGE 1-4\n" + AMC)
+    assert len(raw) == 3 and raw.notes == ("3 frames are read, 4 are declared",)
+
+
 def test_what_is_left_out_is_said(tmp_path: Path) -> None:
     stretched = read(
         tmp_path,
         ASF.replace("dof rz rx", "dof rz rx l"),
         AMC.replace("lower 0 0", "lower 0 0 0").replace("-25", "-25 0.5"),
     )
-    assert "lower" in stretched.notes[0]
+    assert "lower" in stretched.notes[0] and stretched.stretch == Stretch("lower", 0.5)
     np.testing.assert_allclose(stretched.wxyz, read(tmp_path).wxyz)
     partial = read(tmp_path, amc="\n".join(r for r in AMC.split("\n") if "lower" not in r))
     assert partial.notes == ("bones that the motion leaves out stay at rest: lower",)
@@ -358,6 +370,10 @@ BAD_AMC = {
     ),
     "no root": (lambda s: s.replace("root 1 2 3 10 20 30\n", ""), "ends without 'root'"),
     "no frame number": (lambda s: s.replace("60\n1\n", "60\n"), ":5: unexpected 'root'"),
+    "long digits": (
+        lambda s: s.replace("upper 90", "upper 0.12345678901234567891x"),
+        ":11: '0.12345678901234567891x' is not a number",
+    ),
     "range": (lambda s: ":FRAME-RANGE 1-9\n" + s, "3 frames; expected 9, as :FRAME-RANGE declares"),
     "bad range": (lambda s: ":FRAME-RANGE 9-1\n" + s, "frame range '9-1'; expected like 1-120"),
     "rate": (lambda s: s.replace("SECOND 60", "SECOND 0"), ":4: '0' frames a second"),
@@ -373,16 +389,23 @@ def test_damaged_motions_are_named(tmp_path: Path, kind: str) -> None:
 
 
 def test_other_encodings_are_named(tmp_path: Path) -> None:
-    with pytest.raises(KumiteError, match=r"small\.amc:11: byte 0xe9"):
-        read(tmp_path, amc=AMC.replace("upper 90", "éupper 90").encode("latin-1"))
+    asf, amc = (s.replace("upper", "épaule") for s in (ASF, AMC))
+    read(tmp_path, amc=amc.encode("latin-1"), asf=asf)
+    (tmp_path / "small.asf").write_bytes(asf.encode("latin-1"))
+    raw = read_amc(tmp_path / "small.amc", read_asf(tmp_path / "small.asf"))
+    assert raw.skeleton.names[1] == "épaule" and "read as Windows-1252" in raw.notes[0]
+    with pytest.raises(KumiteError, match=r"small\.amc:7: byte 0xe9 is not 'utf-8'"):
+        read_amc(tmp_path / "small.amc", read_asf(tmp_path / "small.asf"), encoding="utf-8")
 
 
 def test_deep_skeletons_are_not_recursion(tmp_path: Path) -> None:
-    count = 5_000
+    count = MOST_JOINTS
     bones = "".join(f"begin\nname b{k}\ndirection 0 1 0\nlength 1\nend\n" for k in range(count))
     links = "root b0\n" + "".join(f"b{k} b{k + 1}\n" for k in range(count - 1))
     raw = read(tmp_path, f":bonedata\n{bones}:hierarchy\n{links}", "1\nroot 0 0 0 0 0 0\n")
     assert len(raw.skeleton) == count + 1
+    with pytest.raises(KumiteError, match="more than 2000 bones"):
+        read(tmp_path, f":bonedata\n{bones}begin\nname x\nend\n:hierarchy\n{links}")
 
 
 PIECES = st.sampled_from(

@@ -16,7 +16,8 @@ from kumite.errors import KumiteError
 from kumite.export.bvh import ORDERS, write_bvh
 from kumite.mocap import text
 from kumite.mocap.bvh import read_bvh
-from kumite.mocap.raw import RawMotion, to_clip, to_y_up
+from kumite.mocap.raw import MOST_JOINTS, RawMotion, Stretch, to_clip, to_y_up
+from kumite.mocap.rigid import fixed_bones
 
 ARM = """HIERARCHY
 ROOT base
@@ -150,6 +151,19 @@ def test_layout_does_not_matter(tmp_path: Path) -> None:
         "blank lines": ARM.replace("\n", "\n\n"),
         "wrapped rows": ARM.replace("1 2 3 0", "1 2 3\n0"),
         "no last line end": ARM.rstrip("\n"),
+        "comments": "# made by hand\n// twice\n"
+        + ARM.replace("  JOINT mid", "  # mid\n  JOINT mid"),
+        "comments in the motion": ARM.replace("\n1 2 3 90", "\n# the second\n1 2 3 90"),
+        "channels below": ARM.replace("3 Yrotation Zrotation", "\n3\n\nYrotation\nZrotation"),
+        "offsets below": ARM.replace("OFFSET 0 2 0", "OFFSET\n0\n2 0"),
+        "spaces at colons": ARM.replace("Frames: 2", "frames  :\t2 ").replace("Time:", "time :"),
+        "no colons": ARM.replace("Frames:", "Frames").replace("Frame Time:", "FrameTime"),
+        "one motion line": ARM.replace("Frames: 2\n", "Frames: 2 ").replace("0 0\n1", "0 0 1"),
+        "brace before motion": ARM.replace("}\nMOTION", "} MOTION"),
+        "all lower case": ARM.lower(),
+        "one row more": ARM.replace("Frames: 2", "Frames: 1"),
+        "one row fewer": ARM.replace("Frames: 2", "Frames: 3"),
+        "utf-16": ARM.encode("utf-16"),
         "exponents": ARM.replace("90 0 0 90 0 0 90", "9e1 0.0 -0 9.0E+01 0 +0e-5 900e-1"),
     }
     for kind, source in variants.items():
@@ -193,34 +207,41 @@ Frame Time: .04
 """
 
 
+def fixed(raw: RawMotion, *, follow: bool = True) -> RawMotion:
+    return fixed_bones(raw, {"pelvis": 0}, follow=follow)[0]
+
+
 def test_constant_position_channels_become_the_offset(tmp_path: Path) -> None:
-    raw = read(tmp_path, SIX.format(extra="", rows="0 0 0 0 3 0 0\n0 0 0 0 3 0 90"))
+    raw = fixed(read(tmp_path, SIX.format(extra="", rows="0 0 0 0 3 0 0\n0 0 0 0 3 0 90")))
     np.testing.assert_array_equal(raw.skeleton.offsets[1], [0, 3, 0])
     assert raw.notes == ()
     np.testing.assert_allclose(positions(raw)[1, 2], [-1, 3, 0], atol=1e-12)
 
 
 def test_positions_of_zero_keep_the_offset(tmp_path: Path) -> None:
-    raw = read(tmp_path, SIX.format(extra="", rows="0 0 0 0 0 0 0\n0 0 0 0 0 0 90"))
+    raw = fixed(read(tmp_path, SIX.format(extra="", rows="0 0 0 0 0 0 0\n0 0 0 0 0 0 90")))
     np.testing.assert_array_equal(raw.skeleton.offsets[1], [0, 1, 0])
 
 
 def test_bones_that_stretch_are_held_and_said(tmp_path: Path) -> None:
-    raw = read(
-        tmp_path,
-        SIX.format(extra="End Site { OFFSET 1 0 0 }", rows="0 0 0 0 3 0 0\n0 0 0 0 4 0 0"),
-    )
+    source = SIX.format(extra="", rows="0 0 0 0 3 0 0\n0 0 0 0 4 0 0")
+    raw = fixed(read(tmp_path, source))
     np.testing.assert_array_equal(raw.skeleton.offsets[1], [0, 3.5, 0])
-    assert "b (up to 0.5" in raw.notes[0]
+    assert raw.stretch == Stretch("b", 0.5)
+    assert "keep one: b; joints lie up to 0.5 file units" in raw.notes[0]
+    told = fixed(read(tmp_path, source), follow=False)
+    np.testing.assert_array_equal(told.skeleton.offsets[1], [0, 1, 0])
+    assert told.stretch is None and "left out, as said" in told.notes[0]
 
 
 def test_hips_below_a_reference_joint_become_the_root(tmp_path: Path) -> None:
     raw = read(tmp_path, SIX.format(extra="", rows="1 0 0 0 3 0 0\n1 0 0 0 3 7 90"))
+    raw = fixed_bones(raw, {"pelvis": 1})[0]
     assert raw.skeleton.names == ("b", "c")
     np.testing.assert_allclose(
         positions(raw), [[[1, 3, 0], [1, 4, 0]], [[1, 3, 7], [0, 3, 7]]], atol=1e-12
     )
-    assert "'a' above 'b' was merged" in raw.notes[0]
+    assert "joint a above b was merged" in raw.notes[0]
 
 
 @pytest.mark.parametrize(
@@ -275,11 +296,33 @@ BAD = {
     "end without offset": (lambda s: s.replace("OFFSET 0 0 1", ""), "End Site has no OFFSET"),
     "joint in an end": (lambda s: s.replace("OFFSET 0 0 1", "JOINT x"), "'JOINT' in an End Site"),
     "end of what": (lambda s: s.replace("End Site", "End"), "'End'; expected 'End Site'"),
-    "few frames": (lambda s: s.replace("Frames: 2", "Frames: 3"), "2 frames of motion; expected 3"),
+    "few frames": (lambda s: s.replace("Frames: 2", "Frames: 4"), "2 frames of motion; expected 4"),
     "more frames": (
-        lambda s: s.replace("Frames: 2", "Frames: 1"),
-        "2 frames of motion; expected 1",
+        lambda s: s + "1 2 3 90 0 0 90 0 0 90\n" * 2,
+        "4 frames of motion; expected 2",
     ),
+    "shifted rows": (
+        lambda s: s.replace("0 0 0\n1 2 3 90", "0 0\n0 1 2 3 90"),
+        ":28: 9 numbers; expected 10",
+    ),
+    "long digits": (
+        lambda s: s.replace("1 2 3 90", "1 2 0.12345678901234567891x 90"),
+        ":29: '0.12345678901234567891x' is not a number",
+    ),
+    "long underscore": (
+        lambda s: s.replace("1 2 3 90", "1 2 0.12345678901234567891_1 90"),
+        ":29: '0.12345678901234567891_1' is not a number",
+    ),
+    "decimal comma": (
+        lambda s: s.replace("1 2 3 90", "1 2,5 3 90"),
+        ":29: '2,5' is not a number; expected a decimal point",
+    ),
+    "endless": (lambda s: s.replace("0.033333", "1" * 5000), "is beyond ±1e.09; expected a frame"),
+    "endless power": (
+        lambda s: s.replace("0.033333", "1e-" + "1" * 5000),
+        "Frame Time: .*; expected a frame time from",
+    ),
+    "rate": (lambda s: s.replace("0.033333", "30"), "else say --file-fps 30 if this is a rate"),
     "huge count": (lambda s: s.replace("Frames: 2", "Frames: 99999999999"), "expected 99999999999"),
     "no frames": (
         lambda s: s.replace("Frames: 2", "Frames: 0"),
@@ -312,16 +355,29 @@ def test_damage_is_named_with_its_line(tmp_path: Path, kind: str) -> None:
 
 
 def test_other_encodings_are_named(tmp_path: Path) -> None:
-    with pytest.raises(KumiteError, match=r"take\.bvh:6: byte 0xe9 is not UTF-8"):
-        read(tmp_path, ARM.replace("mid", "épaule").encode("latin-1"))
+    for name, encoding, said in (
+        ("épaule", "latin-1", "read as Windows-1252"),
+        ("頭", "shift_jis", "read as Shift-JIS"),
+        ("手", "utf-16", "read as UTF-16"),
+    ):
+        raw = read(tmp_path, ARM.replace("mid", name).encode(encoding))
+        assert raw.skeleton.names[1] == name and said in raw.notes[0]
+        assert read_bvh(raw.source, encoding=encoding).notes == ()
+    (tmp_path / "take.bvh").write_bytes(ARM.replace("mid", "躯").encode("gbk"))
+    assert read_bvh(tmp_path / "take.bvh", encoding="gbk").skeleton.names[1] == "躯"
+    with pytest.raises(KumiteError, match=r"take\.bvh:6: byte 0x.. is not 'ascii'"):
+        read_bvh(tmp_path / "take.bvh", encoding="ascii")
+    for odd in ("nonsense", "rot13", "hex", "a\0b"):
+        with pytest.raises(KumiteError, match="unknown encoding"):
+            read_bvh(tmp_path / "take.bvh", encoding=odd)
     with pytest.raises(KumiteError, match="not a plain text file"):
-        read(tmp_path, ARM.encode("utf-16"))
+        read(tmp_path, b"\0" + ARM.encode())
     with pytest.raises(KumiteError, match="cannot be read"):
         read_bvh(tmp_path / "missing.bvh")
 
 
 def test_nesting_is_not_recursion(tmp_path: Path) -> None:
-    depth = 20_000
+    depth = MOST_JOINTS - 1
     opened = "".join(f"JOINT j{k} {{ OFFSET 0 1 0 CHANNELS 0\n" for k in range(depth))
     head = "HIERARCHY\nROOT r { OFFSET 0 0 0 CHANNELS 1 Xrotation\n"
     motion = "MOTION\nFrames: 1\nFrame Time: 0.1\n0\n"
@@ -332,6 +388,8 @@ def test_nesting_is_not_recursion(tmp_path: Path) -> None:
         read(tmp_path, head + opened + "\n" + motion)
     with pytest.raises(KumiteError, match="unexpected"):
         read(tmp_path, "HIERARCHY\n" + "{" * 100_000)
+    with pytest.raises(KumiteError, match=r":2002: more than 2000 joints"):
+        read(tmp_path, head + opened + "JOINT x {" + "}" * (depth + 1) + "\n" + motion)
 
 
 @settings(max_examples=150, deadline=None)
@@ -398,8 +456,13 @@ def test_z_up_files_stand_up(tmp_path: Path) -> None:
     expected = positions(raw)[..., [0, 2, 1]] * [1, 1, -1]
     np.testing.assert_allclose(positions(upright), expected, atol=1e-12)
     np.testing.assert_allclose(upright.skeleton.tip_offsets[0], [0, 1, 0], atol=1e-12)
-    with pytest.raises(KumiteError, match="expected one of Y, Z"):
-        to_y_up(raw, "X")
+    for axis, k, sign in (("X", 0, 1), ("-X", 0, -1), ("-Y", 1, -1), ("-Z", 2, -1)):
+        turned = positions(to_y_up(raw, axis))
+        np.testing.assert_allclose(turned[..., 1], sign * positions(raw)[..., k], atol=1e-12)
+        # Turned, not mirrored: three places span the same volume, with its sign.
+        assert np.linalg.det(turned[1]) == pytest.approx(np.linalg.det(positions(raw)[1]))
+    with pytest.raises(KumiteError, match="expected one of Y, Z, X, -Y, -Z, -X"):
+        to_y_up(raw, "W")
 
 
 # Out ---------------------------------------------------------------------------------------------

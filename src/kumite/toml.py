@@ -11,28 +11,47 @@ from pydantic import BaseModel, ValidationError
 
 from kumite.errors import KumiteError, at
 
+MOST_CHARACTERS = 4_000_000  # of a text
+MOST_PARTS = 32  # of a dotted key: time to parse grows with their square
+_MOST_PROBLEMS = 20  # told at once
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')\s*+"""
+_DEEP_KEY = re.compile(rf"(?<![\w-])(?:{_PART}\.\s*+){{{MOST_PARTS}}}")
+
 Model = TypeVar("Model", bound=BaseModel)
 
 
 def parse(source: str, where: Path | str, model: type[Model]) -> Model:
     """The settings that a text holds.
 
-    Errors: not TOML; unknown, missing and wrong keys.
+    Errors: not TOML; unknown, missing and wrong keys; more than a person writes.
     """
+    _refuse_monsters(source, where)
     try:
         return model.model_validate(tomllib.loads(source))
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        line = re.search(r"at line (\d+)", str(error))
-        raise at(where, int(line[1]) if line else None, f"not TOML: {error}") from None
+    # ValueError: a TOMLDecodeError is one, and so is what int() says of a number of 5,000 digits.
     except ValidationError as error:
         raise KumiteError("\n".join(_problems(where, source, model, error))) from None
+    except (ValueError, OverflowError, RecursionError) as error:
+        line = re.search(r"at line (\d+)", str(error))
+        raise at(where, int(line[1]) if line else None, f"not TOML: {error}") from None
+
+
+def _refuse_monsters(source: str, where: Path | str) -> None:
+    """Errors: a text or a key that would take long to parse, and that nobody means."""
+    if len(source) > MOST_CHARACTERS:
+        what = f"{len(source)} characters; expected at most {MOST_CHARACTERS}"
+        raise KumiteError(f"{where}: {what}")
+    deep = _DEEP_KEY.search(source)
+    if deep is not None:
+        line = source.count("\n", 0, deep.start()) + 1
+        raise at(where, line, f"a key of more than {MOST_PARTS} parts; expected fewer dots")
 
 
 def _problems(
     where: Path | str, source: str, model: type[BaseModel], error: ValidationError
 ) -> list[str]:
     out = []
-    for problem in error.errors():
+    for problem in error.errors()[:_MOST_PROBLEMS]:
         place = problem["loc"]
         key = ".".join(repr(k) if "." in str(k) else str(k) for k in place)
         message = problem["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
@@ -43,8 +62,7 @@ def _problems(
         elif problem["type"] == "value_error":  # raised by a model of ours: it says it all
             what = f"{key}: {message}" if key else message
         else:
-            given = repr(problem["input"])
-            given = given if len(given) < 80 else given[:77] + "…"
+            given = _shown(problem["input"])
             limits = problem.get("ctx", {})
             if "too_short" in problem["type"]:
                 message = f"at least {limits['min_length']}"
@@ -52,7 +70,16 @@ def _problems(
                 message = f"at most {limits['max_length']}"
             what = f"{key}: {given}; expected {message}"
         out.append(f"{at(where, line_of(source, *place), what)}")
-    return out
+    more = error.error_count() - len(out)
+    return out + ([f"{where}: and {more} more"] if more > 0 else [])
+
+
+def _shown(value: Any) -> str:
+    try:
+        given = repr(value)
+    except ValueError:  # an integer of more digits than Python prints
+        return "a number of thousands of digits"
+    return given if len(given) < 80 else given[:77] + "…"
 
 
 def _keys(model: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:

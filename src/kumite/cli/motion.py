@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.table import Table
 
 from kumite.cli.app import JsonOption, Stages, app, err, out, print_json, progress
 from kumite.cli.library import is_library, library_lines, library_values, show_library
-from kumite.cli.reading import FpsOption, Reading, Source, reads_mocap
+from kumite.cli.reading import FpsOption, Reading, SkipBad, Source, reads_mocap
 from kumite.errors import KumiteError, unknown
 
+if TYPE_CHECKING:
+    from kumite.mocap import Loaded
+
+SOME_BAD = 3  # exit status of info where some files cannot be read
 SHORTEST_ACTION = 0.25  # s; below it a graph is too fine to fight by
 
 SourceOrLibrary = Annotated[
@@ -33,7 +37,10 @@ def info(
     *,
     reading: Reading,
 ) -> None:
-    """What is in motion capture files (rates, blows, all that was inferred), or in a library."""
+    """What is in motion capture files (rates, blows, all that was inferred), or in a library.
+
+    Ends with status 3 if some of the files cannot be read, 2 if none can.
+    """
     from kumite.annotate import Strikes, find_strikes
     from kumite.clip import LIMBS, check, concatenate
 
@@ -41,7 +48,7 @@ def info(
         given = [*([] if fps is None else ["--fps"]), *reading.given()]
         show_library(source[0], plot, as_json, given)
         return
-    loaded = reading.load(source, fps)
+    loaded = reading.load(source, fps, skip_bad=True)
     hits: dict[str, dict[str, int]] = {}
     every: list[Strikes] = []
     for group in loaded.by_skeleton():
@@ -83,8 +90,11 @@ def info(
                 "metres_per_unit": scales[0] if len(scales) == 1 else scales,
                 "roles": dict(loaded.info[0].roles),
                 "problems": problems,
+                "doubts": loaded.doubts(),
+                "bad": [{"source": str(b.source), "reason": b.reason} for b in loaded.bad],
             }
         )
+        _end_with_bad(loaded)
         return
     table = Table(title=f"{len(loaded.clips)} clips, {sum(c.seconds for c in loaded.clips):.1f} s")
     for column in ("clip", "fps", "frames", "seconds", *(n.replace("_", " ") for n in LIMBS)):
@@ -100,6 +110,13 @@ def info(
         err.print(f"warning: {line}", markup=False, highlight=False)
     if plot is not None:
         out.print(f"wrote {plot}", markup=False, highlight=False)
+    _end_with_bad(loaded)
+
+
+def _end_with_bad(loaded: Loaded) -> None:
+    """End with a status of its own if some of the files could not be read."""
+    if loaded.bad:
+        raise typer.Exit(SOME_BAD)
 
 
 @app.command()
@@ -170,6 +187,7 @@ def build(
     ] = None,
     as_json: JsonOption = False,
     fps: FpsOption = None,
+    skip_bad: SkipBad = False,
     *,
     reading: Reading,
 ) -> None:
@@ -202,7 +220,7 @@ def build(
         },
     )
     refuse_unwritable(output)  # before the work, not after
-    loaded = reading.load(source, fps)
+    loaded = reading.load(source, fps, skip_bad=skip_bad)
     with progress() as bars:
         stages, clips = Stages(bars), loaded.clip_set()
         parts = read_avoidance(actions, clips) if avoidance and actions else avoidance
@@ -365,6 +383,7 @@ def likeness(
         typer.Option(help="A style of the built-in performer; may be repeated."),
     ] = None,
     as_json: JsonOption = False,
+    skip_bad: SkipBad = False,
     *,
     reading: Reading,
 ) -> None:
@@ -377,7 +396,7 @@ def likeness(
         raise KumiteError("name motion capture files, or a --style of the built-in performer")
     found = {}
     if source:
-        loaded = reading.load(source)
+        loaded = reading.load(source, skip_bad=skip_bad)
         for k, group in enumerate(loaded.by_skeleton()):
             name = " ".join(source) if k == 0 else f"{' '.join(source)} ({k + 1})"
             found[name] = measure_likeness(concatenate(group))

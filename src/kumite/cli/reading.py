@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from kumite.cli.app import Stages, progress
+from kumite.cli.app import Stages, err, progress
 from kumite.errors import KumiteError
 
 if TYPE_CHECKING:
@@ -19,6 +19,9 @@ Source = Annotated[
     list[str], typer.Argument(help="Mocap: a folder, a glob, .bvh files, .amc files.")
 ]
 FpsOption = Annotated[float | None, typer.Option(help="Resample to this rate, frames a second.")]
+SkipBad = Annotated[
+    bool, typer.Option("--skip-bad", help="Go on without files that cannot be read.")
+]
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,8 @@ class Reading:
         float | None, typer.Option(help="Length of the files' unit in metres (else inferred).")
     ] = None
     up_axis: Annotated[
-        str | None, typer.Option(help="Up axis of the files, Y or Z (else inferred).")
+        str | None,
+        typer.Option(help="Up axis of the files: Y, Z, X, -Y, -Z or -X (else inferred)."),
     ] = None
     ground: Annotated[
         float | None,
@@ -43,6 +47,22 @@ class Reading:
         list[str] | None,
         typer.Option("--role", help="ROLE=JOINT, where names say too little; may be repeated."),
     ] = None
+    encoding: Annotated[
+        str | None,
+        typer.Option(
+            help="Encoding of joint names that are not UTF-8, like shift_jis (else guessed)."
+        ),
+    ] = None
+    joint_positions: Annotated[
+        str | None,
+        typer.Option(
+            help="What position channels below the hips count for: channels (followed, as far as "
+            "bones of one length allow; the default) or offsets (nothing)."
+        ),
+    ] = None
+    keep_t_pose: Annotated[
+        bool, typer.Option("--keep-t-pose", help="Keep T poses and the like at a take's ends.")
+    ] = False
 
     def given(self) -> list[str]:
         """The names of the options that were given."""
@@ -52,14 +72,22 @@ class Reading:
             if getattr(self, f.name) != f.default
         ]
 
-    def load(self, source: Sequence[str], fps: float | None = None) -> Loaded:
-        """The clips of a source."""
+    def load(
+        self, source: Sequence[str], fps: float | None = None, *, skip_bad: bool = False
+    ) -> Loaded:
+        """The clips of a source; warns of files that were left out, and of what is in doubt."""
         from kumite import mocap
 
         said = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "role"}
+        said["keep_t_pose"] = self.keep_t_pose or None
         with progress() as bars:
             Stages(bars)("reading motion capture")
-            return mocap.load(source, fps=fps, roles=_roles(self.role), **said)
+            loaded = mocap.load(source, fps=fps, roles=_roles(self.role), skip_bad=skip_bad, **said)
+        for bad in loaded.bad:
+            err.print(f"left out: {bad}", markup=False, highlight=False)
+        for line in loaded.doubts():
+            err.print(f"warning: {line}", markup=False, highlight=False)
+        return loaded
 
 
 def _roles(pairs: Sequence[str] | None) -> dict[str, str]:

@@ -10,7 +10,7 @@ import typer
 from rich.table import Table
 
 from kumite.cli.app import JsonOption, Stages, app, out, print_json, progress
-from kumite.cli.reading import FpsOption, Reading, reads_mocap
+from kumite.cli.reading import FpsOption, Reading, SkipBad, reads_mocap
 from kumite.errors import KumiteError
 
 
@@ -34,6 +34,7 @@ def segment(
     ] = False,
     as_json: JsonOption = False,
     fps: FpsOption = None,
+    skip_bad: SkipBad = False,
     *,
     reading: Reading,
 ) -> None:
@@ -58,7 +59,7 @@ def segment(
         if fps is not None and fps != made.clips[0].fps:
             raise KumiteError(f"--fps: a style is at {made.clips[0].fps:g} frames a second")
     else:
-        loaded = reading.load(source or [], fps)
+        loaded = reading.load(source or [], fps, skip_bad=skip_bad)
         groups = loaded.by_skeleton()
     sets = [concatenate(group) for group in groups]
     if known is not None:

@@ -6,13 +6,13 @@ import numpy as np
 
 from kumite.kernels.jit import kernel
 
-NO_BYTE = -1  # no token was refused
+NO_BYTE = -1  # no such byte
 MOST_DIGITS = 18  # of a mantissa that fits in an int64
 EXACT_MANTISSA = 1 << 53  # up to here a float64 holds every integer
 EXACT_POWER = 22  # the highest power of ten that a float64 holds exactly
 POWERS_OF_TEN = 10.0 ** np.arange(EXACT_POWER + 1)
 
-SPACE, PLUS, MINUS, DOT = 32, 43, 45, 46
+LINE_END, SPACE, PLUS, MINUS, DOT = 10, 32, 43, 45, 46
 DIGIT_0, DIGIT_9, UPPER_E, LOWER_E = 48, 57, 69, 101
 
 
@@ -29,7 +29,7 @@ def parse_number(data, start, end):
         negative = data[i] == MINUS
         i += 1
     mantissa, digits, kept, power = 0, 0, 0, 0
-    after_dot = False
+    after_dot, too_long = False, False
     while i < end:
         c = int(data[i])
         if c >= DIGIT_0 and c <= DIGIT_9:
@@ -40,8 +40,8 @@ def parse_number(data, start, end):
                     kept += 1
                 if after_dot:
                     power -= 1
-            else:
-                return 0.0, True, False
+            else:  # too long for an int64, but a number only if the rest is one
+                too_long = True
         elif c == DOT and not after_dot:
             after_dot = True
         else:
@@ -67,6 +67,8 @@ def parse_number(data, start, end):
             exponent = min(exponent * 10 + (c - DIGIT_0), 100000)
             i += 1
         power += -exponent if down else exponent
+    if too_long:
+        return 0.0, True, False
     if mantissa == 0:
         return (-0.0 if negative else 0.0), True, True
     if mantissa > EXACT_MANTISSA or power < -EXACT_POWER or power > EXACT_POWER:
@@ -84,17 +86,21 @@ def parse_table(data, words, word_start, column_word, out, inexact):
     ``words[word_start[k]:word_start[k + 1]]``. Numbers go to ``out`` in order; of those that need
     the slow parser, ``inexact`` [.., 3] takes (index in out, first byte, end).
 
-    Returns tokens, numbers, inexact numbers, first byte of the token refused (or NO_BYTE).
+    Returns tokens, numbers, inexact numbers, first byte of the token refused, byte of the first
+    line end within a period (NO_BYTE each, if there is none).
     """
     columns = column_word.shape[0]
     size = data.shape[0]
     tokens, numbers, hard, column = 0, 0, 0, 0
+    broken = NO_BYTE
     i = 0
     while True:
         while i < size and data[i] <= SPACE:
+            if data[i] == LINE_END and column > 0 and broken == NO_BYTE:
+                broken = i
             i += 1
         if i >= size:
-            return tokens, numbers, hard, NO_BYTE
+            return tokens, numbers, hard, NO_BYTE, broken
         start = i
         while i < size and data[i] > SPACE:
             i += 1
@@ -107,15 +113,15 @@ def parse_table(data, words, word_start, column_word, out, inexact):
                 same = words[a + k] == data[start + k]
                 k += 1
             if not same:
-                return tokens, numbers, hard, start
+                return tokens, numbers, hard, start, broken
         else:
             value, is_number, exact = parse_number(data, start, i)
             if not is_number:
-                return tokens, numbers, hard, start
+                return tokens, numbers, hard, start, broken
             out[numbers] = value
             if not exact:
                 if hard == inexact.shape[0]:
-                    return tokens, numbers, hard, start
+                    return tokens, numbers, hard, start, broken
                 inexact[hard, 0] = numbers
                 inexact[hard, 1] = start
                 inexact[hard, 2] = i

@@ -27,7 +27,7 @@ from kumite.clip import NO_PARENT, Skeleton
 from kumite.errors import KumiteError, at, told_of, unknown
 from kumite.kernels import parse
 from kumite.mocap import text
-from kumite.mocap.raw import RawMotion
+from kumite.mocap.raw import MOST_JOINTS, SAY_RATE, RawMotion, Stretch, check_size
 
 DOFS = ("tx", "ty", "tz", "rx", "ry", "rz", "l")
 USUAL_FPS = 120.0  # of CMU's database, whose AMC files do not say
@@ -52,6 +52,7 @@ class AsfSkeleton:
     root_position: np.ndarray  # [3] file units, added to the motion's
     metres_per_unit: float | None  # what :units says, if it does
     radians: bool  # angles of an AMC that does not say
+    notes: tuple[str, ...] = ()  # what was odd about the file
 
 
 @dataclass
@@ -158,6 +159,9 @@ class _Asf:
             raise self.error(bone.line, "a bone without a name")
         if bone.name in self.bones or bone.name == "root":
             raise self.error(bone.line, f"bone {text.shown(bone.name)} twice; expected it once")
+        if len(self.bones) == MOST_JOINTS:
+            what = f"more than {MOST_JOINTS} bones; expected those of a person"
+            raise self.error(bone.line, what)
         self.bones[bone.name] = bone
 
     def read(self, lines: Iterator[tuple[int, str]]) -> None:
@@ -235,14 +239,15 @@ class _Asf:
         return order, parents
 
 
-def read_asf(path: Path | str) -> AsfSkeleton:
-    """One ASF file, in its own units.
+def read_asf(path: Path | str, *, encoding: str | None = None) -> AsfSkeleton:
+    """One ASF file, in its own units. ``encoding``: of its names, where it is not UTF-8.
 
     Errors: missing sections, unknown keys or bones, values that are not numbers, a hierarchy that
     is not one tree.
     """
     path = Path(path)
-    source = text.decode(path, text.read_bytes(path))
+    data, notes = text.read_text(path, encoding)
+    source = text.decode(path, data)
     asf = _Asf(path)
     asf.read(_lines(source))
     bones, parents = asf.ordered()
@@ -271,6 +276,7 @@ def read_asf(path: Path | str) -> AsfSkeleton:
         np.array(asf.root_position),
         None if asf.length is None else INCH / asf.length,
         asf.radians,
+        notes,
     )
 
 
@@ -298,14 +304,20 @@ def _lines(source: str) -> Iterator[tuple[int, str]]:
 # Motion ------------------------------------------------------------------------------------------
 
 
-def read_amc(path: Path | str, asf: AsfSkeleton, fps: float | None = None) -> RawMotion:
+def read_amc(
+    path: Path | str,
+    asf: AsfSkeleton,
+    fps: float | None = None,
+    *,
+    encoding: str | None = None,
+) -> RawMotion:
     """One AMC file on its skeleton, in the files' own units. ``fps`` beats what the file says.
 
     Errors: an unknown bone, another count of values than the bone's degrees of freedom, frames out
     of order or cut off, values that are not numbers.
     """
     path = Path(path)
-    data = text.read_bytes(path)
+    data, odd = text.read_text(path, encoding)
     if b"#" in data:
         data = re.sub(rb"#[^\n]*", b"", data)
     first = re.search(rb"^[ \t]*[^:\s][^\n]*$", data, re.MULTILINE)
@@ -313,45 +325,56 @@ def read_amc(path: Path | str, asf: AsfSkeleton, fps: float | None = None) -> Ra
     if first is None:
         raise at(path, data.count(b"\n") + 1, "the file ends here; expected frame 1")
     header_line = header.count("\n") + 1
-    stated, radians, declared = _amc_header(path, header, asf.radians)
+    stated, radians, declared = _amc_header(path, header, asf.radians, fps)
     body = data[first.start() :]
     motion = _Amc(path, asf, header_line)
     names, values = motion.read(body)
-    if declared is not None and declared != len(values):
+    notes = [*asf.notes, *odd]
+    if declared is not None and abs(declared - len(values)) == 1:
+        notes.append(f"{len(values)} frames are read, {declared} are declared")
+    elif declared is not None and declared != len(values):
         last = header_line + body.rstrip().count(b"\n")
         raise at(path, last, f"{len(values)} frames; expected {declared}, as :FRAME-RANGE declares")
-    notes = []
     absent = [n for n, d in zip(asf.skeleton.names, asf.dofs) if d and n not in names]
     if absent:
         notes.append(f"bones that the motion leaves out stay at rest: {', '.join(absent)}")
+    check_size(path, len(values), len(asf.skeleton))
     root, wxyz, dropped = _poses(asf, names, values, 1.0 if radians else np.pi / 180)
     if dropped:
         notes.append(f"bones that change length or shift keep their rest: {', '.join(dropped)}")
+    wildest = max(dropped, key=lambda n: dropped[n], default=None)
     return RawMotion(
         path,
         asf.skeleton,
         fps or stated or USUAL_FPS,
-        stated is not None,
+        fps is None and stated is not None,
         root,
         wxyz,
         asf.metres_per_unit,
         asf.source,
         tuple(notes),
+        stretch=None if wildest is None else Stretch(wildest, dropped[wildest]),
     )
 
 
-def _amc_header(path: Path, header: str, radians: bool) -> tuple[float | None, bool, int | None]:
-    """Frames a second (None: not said), whether angles are in radians, frames declared."""
-    fps: float | None = None
+def _amc_header(
+    path: Path, header: str, radians: bool, fps: float | None
+) -> tuple[float | None, bool, int | None]:
+    """Frames a second (None: not said), whether angles are in radians, frames declared.
+
+    fps: what the user says of the rate; the file's own is not asked then.
+    """
+    told = fps is not None
     frames: int | None = None
     for line, row in _lines(header):
         key, *rest = row.split()
         key = key.upper()
-        if key == ":SAMPLES-PER-SECOND":
+        if key == ":SAMPLES-PER-SECOND" and not told:
             token = rest[0] if rest else ""
-            fps = text.number(path, line, token, "frames a second")
+            fps = text.number(path, line, token, f"frames a second; else say {SAY_RATE}")
             if not 0.1 <= fps <= 1e5:
-                raise at(path, line, f"{text.shown(token)} frames a second; expected 0.1 to 100000")
+                expected = f"expected 0.1 to 100000; else say {SAY_RATE}"
+                raise at(path, line, f"{text.shown(token)} frames a second; {expected}")
         elif key == ":FRAME-RANGE":
             match = re.fullmatch(r"(\d{1,9})\s*-?\s*(\d{1,9})", " ".join(rest), re.ASCII)
             if match is None or int(match[2]) < int(match[1]):
@@ -469,14 +492,14 @@ class _Amc:
 
 def _poses(
     asf: AsfSkeleton, names: tuple[str, ...], values: np.ndarray, radians_per_unit: float
-) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Root positions [F, 3], rotations [F, J, 4], and the bones whose shifts were left out."""
+) -> tuple[np.ndarray, np.ndarray, dict[str, float]]:
+    """Root positions [F, 3], rotations [F, J, 4], and how far left-out shifts go, by bone."""
     column: dict[tuple[str, str], int] = {}
     for name in names:
         for dof in asf.dofs[asf.skeleton.names.index(name)]:
             column[name, dof] = len(column)
     start, columns, axes = [0], [], []
-    dropped = []
+    dropped: dict[str, float] = {}
     for name, order in zip(asf.skeleton.names, asf.orders):
         # Fixed axes, the first turn first, are body axes with the first turn last.
         for axis in reversed(order):
@@ -485,8 +508,9 @@ def _poses(
                 axes.append("xyz".index(axis))
         start.append(len(columns))
         shifts = ("l",) if name == "root" else ("l", "tx", "ty", "tz")
-        if any((name, s) in column and np.any(values[:, column[name, s]]) for s in shifts):
-            dropped.append(name)
+        shifted = [values[:, column[name, s]] for s in shifts if (name, s) in column]
+        if np.any(shifted):
+            dropped[name] = float(np.linalg.norm(shifted, axis=0).max())
     wxyz = np.empty((len(values), len(asf.skeleton), 4))
     parse.euler_to_wxyz(
         np.ascontiguousarray(values),

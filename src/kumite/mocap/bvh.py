@@ -2,7 +2,8 @@
 
 What the format leaves open is read as its tools do: position channels replace the joint's OFFSET
 (the root's too), and rotation channels turn one after another, each in the axes that the ones
-before it left, in the order that the joint itself gives.
+before it left, in the order that the joint itself gives. What becomes of position channels below
+the root is settled once roles are known (:mod:`kumite.mocap.rigid`).
 """
 
 from __future__ import annotations
@@ -14,20 +15,23 @@ from pathlib import Path
 
 import numpy as np
 
-from kumite import rotation
 from kumite.clip import NO_PARENT, Skeleton
 from kumite.errors import KumiteError, at, told_of
 from kumite.kernels import parse
 from kumite.mocap import text
-from kumite.mocap.raw import RawMotion
+from kumite.mocap.raw import MOST_JOINTS, SAY_RATE, RawMotion, check_size
 
 POSITION_CHANNELS = ("Xposition", "Yposition", "Zposition")
 ROTATION_CHANNELS = ("Xrotation", "Yrotation", "Zrotation")
 _CHANNELS = {c.lower(): c for c in (*POSITION_CHANNELS, *ROTATION_CHANNELS)}
 _KEYWORDS = "ROOT, JOINT, End Site, OFFSET, CHANNELS, { or }"
-_LONGEST_FRAME = 10.0  # s; beyond it a frame time is in another unit
+_LONGEST_FRAME = 1.0  # s; beyond it a frame time is a rate, or in another unit
 _SHORTEST_FRAME = 1e-5  # s
-_STILL = 1e-4  # of the longest bone: a position channel that moves less than this is constant
+_STILL = 2e-5  # of the longest bone: a position channel that differs less from its OFFSET is it
+_MOTION = re.compile(rb"^[ \t]*(?:\}[ \t]*)*(MOTION)(?![^\s{}])", re.MULTILINE | re.IGNORECASE)
+_COMMENT = re.compile(rb"^[ \t]*(?:#|//)[^\n]*", re.MULTILINE)
+_FRAMES = re.compile(rb"\s*Frames[ \t]*:?\s*([^\s:]+)", re.IGNORECASE)
+_FRAME_TIME = re.compile(rb"\s*Frame[ \t]*Time[ \t]*:?[ \t]*(\S*)", re.IGNORECASE)
 
 
 @dataclass
@@ -46,21 +50,27 @@ class _EndSite:
     offset: list[float] | None = None
 
 
-def read_bvh(path: Path | str) -> RawMotion:
+def read_bvh(
+    path: Path | str, *, fps: float | None = None, encoding: str | None = None
+) -> RawMotion:
     """One BVH file, in its own units.
+
+    fps: the file's rate, whatever it says of it; encoding: of its joint names.
 
     Errors: anything but a whole, well-formed file, with line, token and what was expected.
     """
     path = Path(path)
-    data = text.read_bytes(path)
-    motion = re.search(rb"^[ \t]*MOTION[ \t]*$", data, re.MULTILINE | re.IGNORECASE)
-    header = text.decode(path, data if motion is None else data[: motion.start()])
+    data, notes = text.read_text(path, encoding)
+    if b"#" in data or b"//" in data:
+        data = _COMMENT.sub(b"", data)
+    motion = _MOTION.search(data)
+    header = text.decode(path, data if motion is None else data[: motion.start(1)])
     joints = _Hierarchy(path, header).read(complete=motion is not None)
     if motion is None:
         raise at(path, data.count(b"\n") + 1, "the file ends here; expected MOTION")
-    frames, frame_time, start = _motion_header(path, data, motion.end())
-    values = _motion(path, data, start, frames, sum(len(j.channels or ()) for j in joints))
-    return _assemble(path, joints, values, frame_time)
+    frames, rate, start = _motion_header(path, data, motion.end(), fps)
+    values, more = _motion(path, data, start, frames, joints)
+    return _assemble(path, joints, values, rate, (*notes, *more))
 
 
 # Hierarchy ---------------------------------------------------------------------------------------
@@ -148,6 +158,8 @@ class _Hierarchy:
     def joint(self, line: int, name: str, parent: int) -> None:
         if not name:
             raise self.error(line, "a joint without a name")
+        if len(self.joints) == MOST_JOINTS:
+            raise self.error(line, f"more than {MOST_JOINTS} joints; expected those of a person")
         self.opens_next = _Joint(name, parent, len(self.joints))
         self.joints.append(self.opens_next)
 
@@ -162,6 +174,8 @@ class _Hierarchy:
             closed.joint.tips.append(closed.offset)
 
     def offset(self, line: int, inside: _Joint | _EndSite, rest: str) -> str:
+        while len(rest.split()) < 3 and self.todo and _is_number(self.todo[0][1].split()[0]):
+            rest = f"{rest} {self.todo.popleft()[1]}"
         tokens = rest.split(None, 3)
         if len(tokens) < 3:
             raise self.error(line, f"OFFSET with {len(tokens)} numbers; expected 3")
@@ -172,7 +186,15 @@ class _Hierarchy:
         return tokens[3] if len(tokens) > 3 else ""
 
     def channels(self, line: int, inside: _Joint | _EndSite, rest: str) -> str:
-        channels, more = _channels(self.path, line, rest)
+        # Their names may stand on the lines below.
+        words = rest.split()
+        while len(words) < 1 + _count(words) and self.todo:
+            following = self.todo[0][1].split()
+            if words and following[0].lower() not in _CHANNELS:
+                break
+            words += following
+            self.todo.popleft()
+        channels, more = _channels(self.path, line, words)
         if isinstance(inside, _EndSite):
             if channels:
                 raise self.error(line, "CHANNELS in an End Site; expected OFFSET or '}'")
@@ -183,9 +205,17 @@ class _Hierarchy:
         return more
 
 
-def _channels(path: Path, line: int, rest: str) -> tuple[list[str], str]:
-    """The channels of a ``CHANNELS`` statement, and what follows them on the same line."""
-    words = rest.split()
+def _count(words: list[str]) -> int:
+    """How many channels a ``CHANNELS`` statement announces; 0 where that is no count."""
+    return int(words[0]) if words and re.fullmatch(r"[0-6]", words[0]) else 0
+
+
+def _is_number(word: str) -> bool:
+    return word.lstrip("+-")[:1].isdigit() or word.lstrip("+-")[:1] == "."
+
+
+def _channels(path: Path, line: int, words: list[str]) -> tuple[list[str], str]:
+    """The channels of a ``CHANNELS`` statement, and what follows them."""
     if not words or not (words[0].isascii() and words[0].isdigit()) or len(words[0]) > 3:
         shown = text.shown(words[0]) if words else "nothing"
         raise at(path, line, f"CHANNELS {shown}; expected a count from 0 to 6")
@@ -214,71 +244,88 @@ def _channels(path: Path, line: int, rest: str) -> tuple[list[str], str]:
 # Motion ------------------------------------------------------------------------------------------
 
 
-def _motion_header(path: Path, data: bytes, start: int) -> tuple[int, tuple[float, str], int]:
-    """Declared frames, frame time [s] with its text, and the byte at which the numbers begin."""
+def _motion_header(
+    path: Path, data: bytes, start: int, fps: float | None
+) -> tuple[int, float, int]:
+    """Declared frames, frames a second, and the byte at which the numbers begin."""
     found: list[tuple[int, str]] = []
-    line = data.count(b"\n", 0, start) + 1
-    for key in ("Frames", "Frame Time"):
-        value = None
-        while value is None:
-            begin = data.find(b"\n", start) + 1
-            if begin == 0:
+    for key, pattern in (("Frames", _FRAMES), ("Frame Time", _FRAME_TIME)):
+        match = pattern.match(data, start)
+        if match is None:
+            space = re.compile(rb"\s*").match(data, start)
+            start = start if space is None else space.end()
+            line = data.count(b"\n", 0, start) + 1
+            if start == len(data):
                 raise at(path, line, f"the file ends here; expected '{key}:'")
-            line += 1
-            end = data.find(b"\n", begin)
-            end = len(data) if end < 0 else end
-            row = data[begin:end]
-            start = end
-            if row.strip():
-                pattern = rb"\s*" + key.replace(" ", r"\s+").encode() + rb"\s*:\s*(\S+)\s*"
-                match = re.fullmatch(pattern, row, re.IGNORECASE)
-                if match is None:
-                    raise at(
-                        path, line, f"unexpected {text.shown(row.strip())}; expected '{key}: …'"
-                    )
-                value = match.group(1).decode("utf-8", "replace")
-        found.append((line, value))
+            row = data[start:].partition(b"\n")[0].strip()
+            raise at(path, line, f"unexpected {text.shown(row)}; expected '{key}: …'")
+        line = data.count(b"\n", 0, match.start(1)) + 1
+        found.append((line, match[1].decode("utf-8", "replace")))
+        start = match.end()
     (frames_line, frames), (time_line, time) = found
     if not (frames.isascii() and frames.isdigit()) or len(frames) > 12 or int(frames) == 0:
         raise at(path, frames_line, f"Frames: {text.shown(frames)}; expected a count of 1 or more")
+    if fps is None:
+        fps = _rate(path, time_line, time)
+    return int(frames), fps, start
+
+
+def _rate(path: Path, line: int, time: str) -> float:
+    """Frames a second of a frame time as it is written."""
     expected = f"a frame time from {_SHORTEST_FRAME:g} to {_LONGEST_FRAME:g} s"
-    seconds = text.number(path, time_line, time, expected)
+    say = SAY_RATE
+    seconds = text.number(path, line, time or "nothing", f"{expected}; else say {say}")
     if not _SHORTEST_FRAME <= seconds <= _LONGEST_FRAME:
-        raise at(path, time_line, f"Frame Time: {text.shown(time)}; expected {expected}")
-    return int(frames), (seconds, time), start
+        if _LONGEST_FRAME < seconds <= 1000:
+            say = f"--file-fps {seconds:g} if this is a rate (or file_fps in kumite.toml)"
+        what = f"Frame Time: {text.shown(time)}; expected {expected}; else say {say}"
+        raise at(path, line, what)
+    return text.rate_of(seconds, time)
 
 
-def _motion(path: Path, data: bytes, start: int, frames: int, channels: int) -> np.ndarray:
-    """The channels' values [F, channels], in the file's units."""
+def _motion(
+    path: Path, data: bytes, start: int, frames: int, joints: list[_Joint]
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """The channels' values [F, channels], in the file's units; and what is odd about them."""
     body = data[start:]
     first_line = data.count(b"\n", 0, start) + 1
+    channels = sum(len(j.channels or ()) for j in joints)
     if channels == 0:
         raise at(path, first_line, "no joint has channels; expected some motion")
-    table = text.read_table(body, [None])
+    table = text.read_table(body, [None] * channels)
     if table.refused is not None:
         line = first_line + body.count(b"\n", 0, table.refused)
         text.number(path, line, text.token_at(body, table.refused), f"{channels} numbers a frame")
-    if table.tokens == frames * channels:
-        return table.values.reshape(frames, channels)
+    found, over = divmod(table.tokens, channels)
+    check_size(path, found, len(joints))
+    values = table.values[: found * channels].reshape(found, channels)
+    if table.broken is None and over == 0:  # every row is whole
+        if found == frames:
+            return values, ()
+        if abs(found - frames) == 1:
+            return values, (f"{found} whole rows of motion are read, {frames} are declared",)
     rows = 0
+    odd: tuple[int, int] | None = None
     for line, row in enumerate(body.split(b"\n"), first_line):
         count = len(row.split())
-        if count == 0:
-            continue
-        if count != channels:
-            raise at(path, line, f"{count} numbers; expected {channels}, one a channel")
-        rows += 1
+        rows += count > 0
+        if count % channels and odd is None:
+            odd = line, count
+    # Rows may be broken into lines, but not shifted: as many lines as frames are a row each.
+    if over == 0 and found == frames and rows != frames:
+        return values, ()
+    if odd is not None:
+        raise at(path, odd[0], f"{odd[1]} numbers; expected {channels}, one a channel")
     last = first_line + body.rstrip().count(b"\n")
-    raise at(path, last, f"{rows} frames of motion; expected {frames}, as declared")
+    raise at(path, last, f"{found} frames of motion; expected {frames}, as declared, or one beside")
 
 
 # From channels to poses --------------------------------------------------------------------------
 
 
 def _assemble(
-    path: Path, joints: list[_Joint], values: np.ndarray, frame_time: tuple[float, str]
+    path: Path, joints: list[_Joint], values: np.ndarray, fps: float, notes: tuple[str, ...]
 ) -> RawMotion:
-    notes: list[str] = []
     starts = np.concatenate([[0], np.cumsum([len(j.channels or ()) for j in joints])])
     turn_start, columns, axes = [0], [], []
     for joint, first in zip(joints, starts):
@@ -296,12 +343,10 @@ def _assemble(
         np.pi / 180,
         wxyz,
     )
-    parents = np.array([j.parent for j in joints])
     offsets = np.array([j.offset for j in joints], dtype=np.float64)
-    longest = float(np.linalg.norm(offsets[1:], axis=1).max(initial=0.0))
+    still = _STILL * float(np.linalg.norm(offsets[1:], axis=1).max(initial=0.0))
     root_position = np.tile(offsets[0], (len(values), 1))
-    stretched: list[str] = []
-    moving: dict[int, np.ndarray] = {}
+    positions: dict[int, np.ndarray] = {}
     for j, (joint, first) in enumerate(zip(joints, starts)):
         held = {c: int(first) + k for k, c in enumerate(joint.channels or ()) if "position" in c}
         if not held:
@@ -312,40 +357,21 @@ def _assemble(
                 position[:, axis] = values[:, held[channel]]
         if j == 0:
             root_position = position
-            continue
-        middle = np.median(position, axis=0)
-        if np.ptp(position, axis=0).max() > _STILL * max(longest, float(np.abs(middle).max())):
-            moving[j] = position
-        elif np.any(middle):
-            # All zeros beside a real OFFSET are displacements, not a bone of no length.
-            offsets[j] = middle
-    if list(moving) == [1] and np.count_nonzero(parents == 0) == 1 and not joints[0].tips:
-        # A reference joint above the hips: the hips become the root, at the same place in space.
-        notes.append(f"joint {joints[0].name!r} above {joints[1].name!r} was merged into it")
-        root_position = root_position + rotation.rotate(wxyz[:, 0], moving.pop(1))
-        wxyz = np.concatenate(
-            [rotation.multiply(wxyz[:, 0], wxyz[:, 1])[:, None], wxyz[:, 2:]], axis=1
-        )
-        joints, offsets = joints[1:], offsets[1:]
-        parents = np.where(parents[1:] == 0, NO_PARENT, parents[1:] - 1)
-    for j, position in moving.items():
-        middle = np.median(position, axis=0)
-        reach = float(np.linalg.norm(position - middle, axis=1).max())
-        offsets[j] = middle
-        stretched.append(f"{joints[j].name} (up to {reach:.3g} file units)")
-    if stretched:
-        notes.append(f"bones that change length keep their middle length: {', '.join(stretched)}")
+        elif np.abs(position - offsets[j]).max() > still:
+            positions[j] = position
     names, renamed = _unique([j.name for j in joints])
     if renamed:
-        notes.append(f"joint names used twice were numbered: {', '.join(renamed)}")
+        notes = (*notes, f"joint names used twice were numbered: {', '.join(renamed)}")
     tip_parents = np.array([j for j, n in enumerate(joints) for _ in n.tips], dtype=np.int32)
     tip_offsets = np.array([t for n in joints for t in n.tips], dtype=np.float64).reshape(-1, 3)
+    parents = np.array([j.parent for j in joints])
     with told_of(path):
         skeleton = Skeleton(
             names, parents, offsets, tip_parents=tip_parents, tip_offsets=tip_offsets
         )
-    fps = text.rate_of(*frame_time)
-    return RawMotion(path, skeleton, fps, True, root_position, wxyz, notes=tuple(notes))
+    return RawMotion(
+        path, skeleton, fps, True, root_position, wxyz, notes=notes, positions=positions
+    )
 
 
 def _unique(names: list[str]) -> tuple[tuple[str, ...], list[str]]:

@@ -8,7 +8,7 @@ which beats what the file states, which beats inference.
 from __future__ import annotations
 
 import glob
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -21,12 +21,16 @@ from kumite.mocap import infer
 from kumite.mocap.asfamc import AsfSkeleton, read_amc, read_asf
 from kumite.mocap.bvh import read_bvh
 from kumite.mocap.raw import UP_AXES, RawMotion, to_clip
-from kumite.mocap.roles import FoundRoles, find_roles
-from kumite.mocap.settings import SettingsTree
+from kumite.mocap.rigid import fixed_bones
+from kumite.mocap.roles import find_roles
+from kumite.mocap.settings import JOINT_POSITIONS, SettingsTree
+from kumite.mocap.text import short
+from kumite.mocap.trim import without_apart
 
 SUFFIXES = (".bvh", ".amc")
 How = Literal["given", "settings", "stated", "inferred", "assumed"]
 Source = str | Path | Sequence[str | Path]
+MOST_STRETCH = 0.03  # m; bones of one length may take a joint so far from where the file has it
 _MOST_PROBLEMS = 20  # shown of a folder that cannot be read
 
 
@@ -38,9 +42,26 @@ class Fact:
     value: str
     how: How
     why: str = ""
+    doubt: str = ""  # what may be otherwise, and how to say it; empty where there is none
 
     def __str__(self) -> str:
-        return f"{self.what}: {self.value} ({self.how}{': ' if self.why else ''}{self.why})"
+        doubt = f"; in doubt: {self.doubt}" if self.doubt else ""
+        return f"{self.what}: {self.value} ({self.how}{': ' if self.why else ''}{self.why}{doubt})"
+
+
+@dataclass(frozen=True)
+class BadFile:
+    """A file that cannot be read, and why."""
+
+    source: Path
+    reason: str  # all that is wrong, without the file's name where the line is not known
+
+    def __str__(self) -> str:
+        return (
+            self.reason
+            if self.reason.startswith(str(self.source))
+            else f"{self.source}: {self.reason}"
+        )
 
 
 @dataclass(frozen=True)
@@ -65,6 +86,7 @@ class Loaded:
 
     clips: tuple[Clip, ...]
     info: tuple[ClipInfo, ...]  # one a clip
+    bad: tuple[BadFile, ...] = ()  # with skip_bad: files that were gone on without
 
     def clip_set(self, fps: float | None = None) -> ClipSet:
         """All clips end to end at ``fps`` (their lowest rate by default).
@@ -87,9 +109,16 @@ class Loaded:
 
     def report(self) -> list[str]:
         """Every fact once, with the clips that it holds for: what was inferred is never silent."""
+        return self._told(lambda fact: True)
+
+    def doubts(self) -> list[str]:
+        """The facts that may be otherwise, each with the option that settles it."""
+        return self._told(lambda fact: bool(fact.doubt))
+
+    def _told(self, wanted: Callable[[Fact], bool]) -> list[str]:
         holders: dict[str, list[str]] = {}
         for info in self.info:
-            for fact in info.facts:
+            for fact in filter(wanted, info.facts):
                 holders.setdefault(str(fact), []).append(info.name)
         out = []
         for fact, names in holders.items():
@@ -108,8 +137,10 @@ class _Take:
     path: Path
     said: Mapping[str, Any]  # by kumite.toml
     raw: RawMotion
-    roles: FoundRoles
+    roles: Mapping[str, int]  # role -> joint of ``raw``
+    roles_how: Mapping[str, str]
     given_fps: How | None
+    keep_stretch: bool  # whether the user said what becomes of position channels
     facts: list[Fact] = field(default_factory=list)
 
 
@@ -123,6 +154,10 @@ def load(
     ground: float | None = None,
     roles: Mapping[str, str] | None = None,
     names: Mapping[str, str] | None = None,
+    encoding: str | None = None,
+    joint_positions: str | None = None,
+    keep_t_pose: bool | None = None,
+    skip_bad: bool = False,
 ) -> Loaded:
     """Clips from a file, a folder (searched below too), a glob, or a list of these.
 
@@ -131,10 +166,16 @@ def load(
         fps: resample every clip to this rate.
         file_fps: the files' own rate, where they do not state it or state a wrong one.
         metres_per_unit: length of one unit of the files [m].
-        up_axis: ``'Y'`` or ``'Z'``.
+        up_axis: ``'Y'``, ``'Z'``, ``'X'``, or one of these with a minus.
         ground: height of the floor in the files, Y up [m].
         roles: joint names by role, for joints whose names and place say too little.
         names: clip names by file name; otherwise a file's stem.
+        encoding: of joint names, where it is not UTF-8; else guessed.
+        joint_positions: what position channels below the hips count for: ``'channels'``, they are
+            followed, within what bones of one length allow (else the file is refused);
+            ``'offsets'``, nothing.
+        keep_t_pose: keep frames at a take's ends that stand apart from it, too.
+        skip_bad: go on without files that cannot be read; :attr:`Loaded.bad` names them.
 
     Errors: nothing to load, and everything that is wrong with any of the files, at once.
     """
@@ -154,45 +195,61 @@ def load(
     for role in roles or {}:
         if role not in ROLES:
             raise unknown("role", role, ROLES)
+    if joint_positions is not None and joint_positions not in JOINT_POSITIONS:
+        raise unknown("joint_positions", joint_positions, JOINT_POSITIONS)
     given = {
         "fps": fps,
         "file_fps": file_fps,
         "metres_per_unit": metres_per_unit,
         "up_axis": up_axis,
         "ground_height": ground,
+        "encoding": encoding,
+        "joint_positions": joint_positions,
+        "keep_t_pose": keep_t_pose,
     }
     given = {k: v for k, v in given.items() if v is not None}
     files = find_files(source)
     settings = SettingsTree()
-    skeletons: dict[Path, AsfSkeleton] = {}
-    takes: list[_Take] = []
-    problems: list[str] = []
+    said: dict[Path, Mapping[str, Any]] = {}
+    wrong: dict[str, None] = {}  # in the settings: never gone on without
     for path, top in files:
         try:
-            takes.append(_read(path, settings.of(path, top), given, roles or {}, skeletons))
+            said[path] = settings.of(path, top)
         except KumiteError as error:
-            if str(error) not in problems:
-                problems.append(str(error))
-    if problems:
-        _raise(problems)
-    clip_names = _unique_names(takes, names or {})
+            wrong[str(error)] = None
+    if wrong:
+        raise KumiteError("\n".join(wrong))
+    skeletons: dict[tuple[Path, str | None], AsfSkeleton] = {}
+    takes: list[_Take] = []
+    bad: dict[Path, str] = {}
+    for path, _ in files:
+        try:
+            takes.append(_read(path, said[path], given, roles or {}, skeletons))
+        except KumiteError as error:
+            bad[path] = str(error)
     clips: dict[Path, Clip] = {}
     info: dict[Path, ClipInfo] = {}
     for session in _sessions(takes):
-        for take, scale, up, floor in _inferred(session, given, problems):
-            name = clip_names[take.path]
+        for take, scale, up, floor in _inferred(session, given, bad):
             clip = to_clip(
                 take.raw,
-                name,
+                take.path.stem,
                 metres_per_unit=scale,
                 up_axis=up,
                 ground_height=floor,
-                roles=take.roles.joints,
+                roles=take.roles,
             )
+            if not given.get("keep_t_pose", take.said.get("keep_t_pose", False)):
+                clip, notes = without_apart(clip)
+                take.facts += [Fact("repair", note, "inferred") for note in notes]
             rate = given.get("fps", take.said.get("fps"))
-            clips[take.path] = resample(clip, rate) if rate else clip
+            try:
+                clips[take.path] = resample(clip, rate) if rate else clip
+            except KumiteError as error:
+                bad[take.path] = str(error)
+                continue
             info[take.path] = ClipInfo(
-                name,
+                take.path.stem,
                 take.path,
                 take.raw.skeleton_source,
                 len(take.raw),
@@ -200,19 +257,34 @@ def load(
                 scale,
                 up,
                 floor,
-                {r: take.raw.skeleton.names[j] for r, j in take.roles.joints.items()},
+                {r: take.raw.skeleton.names[j] for r, j in take.roles.items()},
                 tuple(take.facts),
             )
-    if problems:
-        _raise(problems)
-    order = [t.path for t in takes]
-    return Loaded(tuple(clips[p] for p in order), tuple(info[p] for p in order))
+    bad_files = tuple(BadFile(p, bad[p]) for p, _ in files if p in bad)
+    if bad_files and not (skip_bad and clips):
+        _raise(bad_files, some_good=bool(clips))
+    good = [t for t in takes if t.path in clips]
+    clip_names = _unique_names(good, names or {}, [p for p, _ in files])
+    return Loaded(
+        tuple(replace(clips[t.path], name=clip_names[t.path]) for t in good),
+        tuple(replace(info[t.path], name=clip_names[t.path]) for t in good),
+        bad_files,
+    )
 
 
-def _raise(problems: list[str]) -> None:
-    more = len(problems) - _MOST_PROBLEMS
-    rest = [f"and {more} more files with problems"] if more > 0 else []
-    raise KumiteError("\n".join([*problems[:_MOST_PROBLEMS], *rest]))
+def _raise(bad: Sequence[BadFile], *, some_good: bool) -> None:
+    """Every bad file with its reason; one reason of many files once."""
+    reasons: dict[str, list[BadFile]] = {}
+    for one in bad:
+        reasons.setdefault(one.reason, []).append(one)
+    lines = [
+        f"{same[0]}" + (f" (and {len(same) - 1} more files like this)" if len(same) > 1 else "")
+        for same in reasons.values()
+    ]
+    more = len(lines) - _MOST_PROBLEMS
+    rest = [f"and {more} more problems"] if more > 0 else []
+    hint = ["say --skip-bad (skip_bad=True) to go on without these files"] if some_good else []
+    raise KumiteError("\n".join([*lines[:_MOST_PROBLEMS], *rest, *hint]))
 
 
 # Finding -----------------------------------------------------------------------------------------
@@ -237,7 +309,7 @@ def find_files(source: Source) -> list[tuple[Path, Path]]:
     try:
         is_folder, exists = path.is_dir(), path.exists()
     except (OSError, ValueError):
-        raise KumiteError(f"{str(source)[:200]!r}: not a path") from None
+        raise KumiteError(f"{short(path)!r}: not a path") from None
     if is_folder:
         files = sorted(p for p in path.rglob("*") if _is_mocap(p))
         if not files:
@@ -253,11 +325,17 @@ def find_files(source: Source) -> list[tuple[Path, Path]]:
         if not files:
             raise KumiteError(f"{path}: matches no mocap; expected .bvh or .amc files")
         return [(p, p.parent) for p in files]
-    raise KumiteError(f"{path}: no such file or folder")
+    raise KumiteError(f"{short(path)}: no such file or folder")
 
 
 def _is_mocap(path: Path) -> bool:
-    return path.suffix.lower() in SUFFIXES and path.is_file()
+    # Hidden files are not takes: editors, downloads and our own writing leave such behind.
+    if path.suffix.lower() not in SUFFIXES or path.name.startswith("."):
+        return False
+    try:
+        return path.is_file()
+    except OSError:  # in a folder that may not be entered
+        return False
 
 
 def find_asf(amc: Path) -> Path:
@@ -265,7 +343,12 @@ def find_asf(amc: Path) -> Path:
 
     Errors: none, or several of which none has the AMC's name.
     """
-    beside = sorted(p for p in amc.parent.iterdir() if p.suffix.lower() == ".asf" and p.is_file())
+    try:
+        beside = sorted(
+            p for p in amc.parent.iterdir() if p.suffix.lower() == ".asf" and p.is_file()
+        )
+    except OSError as error:
+        raise KumiteError(f"{amc.parent}: cannot be read ({error.strerror})") from None
     stem = amc.stem.lower()
     mine = [
         p
@@ -292,24 +375,26 @@ def _read(
     said: Mapping[str, Any],
     given: Mapping[str, Any],
     roles: Mapping[str, str],
-    skeletons: dict[Path, AsfSkeleton],
+    skeletons: dict[tuple[Path, str | None], AsfSkeleton],
 ) -> _Take:
-    if path.suffix.lower() == ".amc":
-        asf = find_asf(path)
-        if asf not in skeletons:
-            skeletons[asf] = read_asf(asf)
-        raw = read_amc(path, skeletons[asf])
-    else:
-        raw = read_bvh(path)
     how: How | None = "given" if "file_fps" in given else "settings" if "file_fps" in said else None
     fps = given.get("file_fps", said.get("file_fps"))
-    if fps is not None:
-        raw = replace(raw, fps=float(fps))
+    fps = None if fps is None else float(fps)
+    encoding = given.get("encoding", said.get("encoding"))
+    if path.suffix.lower() == ".amc":
+        asf = find_asf(path)
+        if (asf, encoding) not in skeletons:
+            skeletons[asf, encoding] = read_asf(asf, encoding=encoding)
+        raw = read_amc(path, skeletons[asf, encoding], fps=fps, encoding=encoding)
+    else:
+        raw = read_bvh(path, fps=fps, encoding=encoding)
     try:
         found = find_roles(raw.skeleton, {**said.get("roles", {}), **roles})
     except KumiteError as error:
         raise KumiteError(f"{raw.skeleton_source or path}: {error}") from None
-    return _Take(path, said, raw, found, how)
+    positions = given.get("joint_positions", said.get("joint_positions"))
+    raw, joints = fixed_bones(raw, found.joints, follow=positions != "offsets")
+    return _Take(path, said, raw, joints, found.how, how, positions == "offsets")
 
 
 def _sessions(takes: Iterable[_Take]) -> list[list[_Take]]:
@@ -322,16 +407,16 @@ def _sessions(takes: Iterable[_Take]) -> list[list[_Take]]:
             skeleton.names,
             skeleton.parents.tobytes(),
             np.round(skeleton.offsets[1:], 3).tobytes(),
-            tuple(take.roles.joints.items()),
+            tuple(take.roles.items()),
         )
         groups.setdefault(key, []).append(take)
     return list(groups.values())
 
 
 def _inferred(
-    session: list[_Take], given: Mapping[str, Any], problems: list[str]
+    session: list[_Take], given: Mapping[str, Any], bad: dict[Path, str]
 ) -> list[tuple[_Take, float, str, float]]:
-    """Scale, up axis and floor of each take; facts are added to the takes."""
+    """Scale, up axis and floor of each take that has them; facts are added to the takes."""
     out = []
     shared: dict[Any, Any] = {}
 
@@ -344,15 +429,21 @@ def _inferred(
                 take.facts.append(Fact(key, f"{_short(value)}{unit}", how))
                 return value
         if (key, *among) not in shared:
-            shared[(key, *among)] = guess(*among)
+            try:
+                shared[(key, *among)] = guess(*among)
+            except KumiteError as error:
+                shared[(key, *among)] = error
         inferred = shared[(key, *among)]
+        if isinstance(inferred, KumiteError):
+            raise inferred
         known: How = "stated" if inferred.stated else "inferred"
-        take.facts.append(Fact(key, f"{_short(inferred.value)}{unit}", known, inferred.why))
+        value = f"{_short(inferred.value)}{unit}"
+        take.facts.append(Fact(key, value, known, inferred.why, inferred.doubt))
         return inferred.value
 
     first = session[0]
     raws = [t.raw for t in session]
-    joints = first.roles.joints
+    joints = first.roles
     for take in session:
         take.facts.append(_rate_fact(take))
         if take.raw.skeleton_source is not None:
@@ -363,10 +454,11 @@ def _inferred(
             scale = settle(
                 take, "metres_per_unit", "", lambda: infer.metres_per_unit(first.raw, joints)
             )
+            up = settle(take, "up_axis", "", lambda: infer.up_axis(raws, joints))
+            _refuse_stretch(take, scale)
         except KumiteError as error:
-            problems.append(str(error))
-            return []
-        up = settle(take, "up_axis", "", lambda: infer.up_axis(raws, joints))
+            bad[take.path] = str(error)
+            continue
         floor = settle(
             take,
             "ground_height",
@@ -378,6 +470,19 @@ def _inferred(
         take.facts += [Fact("repair", note, "inferred") for note in take.raw.notes]
         out.append((take, scale, up, floor))
     return out
+
+
+def _refuse_stretch(take: _Take, scale: float) -> None:
+    """Errors: joints that bones of one length take too far from where the file has them."""
+    stretch = take.raw.stretch
+    if stretch is None or take.keep_stretch or stretch.distance * scale <= MOST_STRETCH:
+        return
+    raise KumiteError(
+        f"position channels move joint {stretch.joint!r} against its parent: with bones of one "
+        f"length joints lie up to {stretch.distance * scale:.2f} m from where the file has them; "
+        f"expected at most {MOST_STRETCH:g} m: say --joint-positions offsets (joint_positions = "
+        '"offsets" in kumite.toml) for the bones of OFFSET'
+    )
 
 
 def _short(value: float | str) -> str:
@@ -399,9 +504,7 @@ def _role_facts(take: _Take) -> list[Fact]:
     )
     facts = []
     for source, how, why in sources:
-        pairs = [
-            f"{r}={names[j]}" for r, j in take.roles.joints.items() if take.roles.how[r] == source
-        ]
+        pairs = [f"{r}={names[j]}" for r, j in take.roles.items() if take.roles_how[r] == source]
         if pairs:
             facts.append(Fact("roles", ", ".join(pairs), how, why))
     return facts
@@ -410,12 +513,14 @@ def _role_facts(take: _Take) -> list[Fact]:
 # Names -------------------------------------------------------------------------------------------
 
 
-def _unique_names(takes: Sequence[_Take], given: Mapping[str, str]) -> dict[Path, str]:
+def _unique_names(
+    takes: Sequence[_Take], given: Mapping[str, str], files: Sequence[Path]
+) -> dict[Path, str]:
     """Clip names: given, from the settings, or the stem; told apart by their folders when equal.
 
     Errors: a given name for a file that is not there; a given name used twice.
     """
-    keys = {k: t.path for t in takes for k in (t.path.stem, t.path.name, t.path.as_posix())}
+    keys = {k for p in files for k in (p.stem, p.name, p.as_posix())}
     for key in given:
         if key not in keys:
             raise KumiteError(f"a name for {key!r}, which is not among the files")

@@ -16,7 +16,7 @@ import numpy as np
 from kumite import rotation
 from kumite.clip import SIDES, Skeleton, forward_kinematics
 from kumite.errors import KumiteError
-from kumite.mocap.raw import UP_AXES, RawMotion, to_y_up
+from kumite.mocap.raw import RawMotion, to_y_up
 
 METRES_PER_UNIT = {
     "metres": 1.0,
@@ -26,12 +26,18 @@ METRES_PER_UNIT = {
     "CMU's 0.45-inch units": 0.0254 / 0.45,
 }
 USUAL_LEG = 0.86  # m, hip to ankle along the bones; adults have 0.75 to 1.0
-LEG_RANGE = (0.55, 1.3)  # m; children and giants; no two known units both land in here
+LEG_RANGE = (0.5, 1.15)  # m; a child of five, and nearly the longest legs there are
+USUAL_RANGE = (0.70, 1.05)  # m; adults: where two units fit, the one that gives these
+STATED_RANGE = (0.4, 1.3)  # m; what a header may say of a performer
 TOE_HEIGHT = 0.03  # m; a toe or foot tip of a body model when its sole is on the floor
 ANKLE_HEIGHT = 0.08  # m; for skeletons that end at the ankle
 NEAR_FLOOR = 0.08  # m; feet that come down this near to where they should keep the file's own floor
 _LOW = 5.0  # percentile of the lowest foot point's height: low, but not one bad frame
-_CLEAR = 0.2  # how much more upright a body must be about one axis than about the other
+_CLEAR = 0.2  # how much more upright a body must be along one axis than along the next
+_SAY_UNIT = "say --metres-per-unit, or metres_per_unit in kumite.toml"
+_SAY_UP = "say --up-axis, or up_axis in kumite.toml"
+_ALWAYS = 0.8  # how upright along an unusual axis a body must be in the mean of all frames
+_USUAL_AXES = ("Y", "Z")
 _MOST_FRAMES = 2000  # of a clip that are looked at
 
 
@@ -45,6 +51,7 @@ class Inferred(Generic[T]):
     value: T
     why: str
     stated: bool = False  # by the file itself
+    doubt: str = ""  # what may be otherwise, and how to say it; empty where nothing speaks for it
 
 
 def leg_length(skeleton: Skeleton, roles: Mapping[str, int]) -> float:
@@ -57,28 +64,38 @@ def leg_length(skeleton: Skeleton, roles: Mapping[str, int]) -> float:
 def metres_per_unit(raw: RawMotion, roles: Mapping[str, int]) -> Inferred[float]:
     """The unit in which the legs are a person's; the header's own, if that is plausible.
 
-    Errors: no known unit fits.
+    Errors: no known unit fits, or two do and neither gives an adult.
     """
     leg = leg_length(raw.skeleton, roles)
-    low, high = LEG_RANGE
     stated = raw.metres_per_unit
-    if stated is not None and low <= leg * stated <= high:
+    if stated is not None and _within(leg * stated, STATED_RANGE):
         return Inferred(stated, f"the header's units; legs of {leg * stated:.2f} m", stated=True)
-    if leg > 0:
-        fits = {n: abs(np.log(leg * u / USUAL_LEG)) for n, u in METRES_PER_UNIT.items()}
-        name = min(fits, key=lambda n: fits[n])
-        size = leg * METRES_PER_UNIT[name]
-        if low <= size <= high:
-            return Inferred(METRES_PER_UNIT[name], f"{name}; legs of {size:.2f} m")
-    sizes = ", ".join(f"{leg * u:.3g} m in {n}" for n, u in METRES_PER_UNIT.items())
-    raise KumiteError(
-        f"{raw.source}: the legs fit a person in no known unit ({sizes}); expected a given "
-        "metres_per_unit"
-    )
+    sizes = {name: leg * unit for name, unit in METRES_PER_UNIT.items()}
+    fits = [name for name, size in sizes.items() if _within(size, LEG_RANGE)]
+    usual = [name for name in fits if _within(sizes[name], USUAL_RANGE)]
+    chosen = usual if len(usual) == 1 else fits
+    if len(chosen) == 1:
+        (name,) = chosen
+        size = sizes[name]
+        doubt = ""
+        if not usual:
+            kind = "a child's" if size < USUAL_LEG else "very long"
+            doubt = f"such legs are {kind}; {_SAY_UNIT} if that is wrong"
+        return Inferred(METRES_PER_UNIT[name], f"{name}; legs of {size:.2f} m", doubt=doubt)
+    fit = "two known units" if fits else "no known unit"
+    each = ", ".join(f"{sizes[n]:.3g} m with {u:.4g} ({n})" for n, u in METRES_PER_UNIT.items())
+    raise KumiteError(f"the legs fit a person in {fit}: {each}; {_SAY_UNIT}")
+
+
+def _within(size: float, bounds: tuple[float, float]) -> bool:
+    return bounds[0] <= size <= bounds[1]
 
 
 def up_axis(clips: Sequence[RawMotion], roles: Mapping[str, int]) -> Inferred[str]:
-    """The axis along which heads are above feet: in the motion, or else in the rest pose."""
+    """The axis along which heads are above feet: in the motion, or else in the rest pose.
+
+    Errors: an unusual axis in the motion that the rest pose does not confirm.
+    """
     upright = np.zeros(3)
     frames = 0
     for raw in clips:
@@ -86,15 +103,35 @@ def up_axis(clips: Sequence[RawMotion], roles: Mapping[str, int]) -> Inferred[st
         upright += _body_axis(position, roles).sum(axis=0)
         frames += len(position)
     upright /= max(frames, 1)
+    moving = _clear_axis(upright)
+    if moving not in (None, *_USUAL_AXES) and float(np.abs(upright).max()) < _ALWAYS:
+        moving = None  # who crawls has been upright, too, or turns round
+    resting = _clear_axis(_body_axis(clips[0].skeleton.rest_positions[None], roles)[0])
     why = "heads are above feet in the motion"
-    y, z = float(upright[1]), float(upright[2])
-    if abs(y - z) < _CLEAR:
-        rest = _body_axis(clips[0].skeleton.rest_positions[None], roles)[0]
-        y, z = float(rest[1]), float(rest[2])
-        why = "the head is above the feet in the rest pose"
-        if abs(y - z) < _CLEAR:
-            return Inferred(UP_AXES[0], "usual; neither motion nor rest pose tells")
-    return Inferred("Y" if y > z else "Z", why)
+    if moving is None:
+        if resting is None:
+            doubt = f"{_SAY_UP} if people lie"
+            return Inferred("Y", "usual; neither motion nor rest pose tells", doubt=doubt)
+        return Inferred(resting, "the head is above the feet in the rest pose")
+    if moving == resting or moving == "Y":
+        return Inferred(moving, why)
+    if moving == "Z":
+        doubt = f"the rest pose stands along {resting}; {_SAY_UP} if people lie on the floor"
+        return Inferred(moving, why, doubt="" if resting is None else doubt)
+    rest = "tells nothing" if resting is None else f"along {resting}"
+    raise KumiteError(
+        f"heads are above feet along {moving} in the motion, the rest pose {rest}: people lie or "
+        f"{moving} is up; {_SAY_UP}"
+    )
+
+
+def _clear_axis(upright: np.ndarray) -> str | None:
+    """The axis, with its sign, that a vector [3] follows clearly more than the others."""
+    order = np.argsort(-np.abs(upright))
+    first, second = np.abs(upright[order[:2]])
+    if first - second < _CLEAR:
+        return None
+    return f"{'-' if upright[order[0]] < 0 else ''}{'XYZ'[order[0]]}"
 
 
 def ground_height(

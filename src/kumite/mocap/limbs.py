@@ -14,6 +14,8 @@ import numpy as np
 from kumite.clip import NO_PARENT, Skeleton
 
 _LIKE = 0.12  # twins' bone lengths may differ by this part
+_MOST_BRANCHES = 16  # of three joints or more on one joint: a hand has five
+_MOST_IN_ROW = 40  # joints of a limb
 _SHORT = 1e-6  # of the longest bone: shorter bones are helpers
 
 
@@ -37,14 +39,19 @@ def find_limbs(skeleton: Skeleton) -> Limbs | None:
     children: list[list[int]] = [[] for _ in skeleton.names]
     for j in range(1, len(skeleton)):
         children[int(skeleton.parents[j])].append(j)
+    shortest = _SHORT * float(lengths.max())
     for joint, below in enumerate(children):
-        chains = [_main_chain(c, children, lengths, size) for c in below]
+        if len(below) < 2:
+            continue
+        chains = [_main_chain(c, children, lengths, size, shortest) for c in below]
+        chains = [c for c in chains if len(c) >= 3]
+        if len(chains) > _MOST_BRANCHES:
+            continue
         for a in range(len(chains)):
             for b in range(a + 1, len(chains)):
                 if _twins(chains[a], chains[b], lengths):
                     pairs.append((joint, chains[a], chains[b]))
     depth = _depths(skeleton)
-    pairs = [p for p in pairs if min(len(p[1]), len(p[2])) >= 3]
     # Fingers are twins too, but below a hand: keep pairs whose joint lies in no other pair's chain.
     inside = {j for _, a, b in pairs for j in (*a, *b)}
     pairs = sorted((p for p in pairs if p[0] not in inside), key=lambda p: depth[p[0]])
@@ -112,13 +119,12 @@ def _branch_sizes(skeleton: Skeleton, lengths: np.ndarray) -> np.ndarray:
 
 
 def _main_chain(
-    joint: int, children: list[list[int]], lengths: np.ndarray, size: np.ndarray
+    joint: int, children: list[list[int]], lengths: np.ndarray, size: np.ndarray, shortest: float
 ) -> list[int]:
     """From a joint down its longest branch, without joints that lie where their parent does."""
     chain = [joint]
-    while children[chain[-1]]:
+    while children[chain[-1]] and len(chain) < _MOST_IN_ROW:
         chain.append(max(children[chain[-1]], key=lambda c: size[c]))
-    shortest = _SHORT * lengths.max()
     # Of joints in one place the last turns the bone below.
     return [
         j

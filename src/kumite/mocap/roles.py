@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import itertools
 import re
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -31,13 +32,13 @@ from kumite.mocap.limbs import Limbs, find_limbs
 # Part names by role, the clearest first: with a CMU hand and a CMU wrist, the hand is the hand.
 _SIDED = {
     "clavicle": ("clavicle", "collar", "collarbone", "shoulder"),
-    "upper_arm": ("upperarm", "uparm", "humerus", "shldr", "arm", "shoulder"),
-    "forearm": ("forearm", "lowerarm", "lowarm", "radius", "elbow"),
+    "upper_arm": ("upperarm", "uparm", "uarm", "humerus", "shldr", "arm", "shoulder"),
+    "forearm": ("forearm", "farm", "lowerarm", "lowarm", "larm", "radius", "elbow"),
     "hand": ("hand", "wrist", "palm"),
     "thigh": ("upleg", "thigh", "femur", "upperleg", "hip", "leg"),
     "shin": ("shin", "tibia", "lowerleg", "lowleg", "calf", "knee", "leg"),
     "foot": ("foot", "ankle"),
-    "toe": ("toe", "toes", "toebase", "ball"),
+    "toe": ("toe", "toes", "toebase", "ball", "metatarsals"),
 }
 _SIDED_BY_JOINT = {
     "hand": ("wrist", "hand"),
@@ -50,7 +51,10 @@ _MIDDLE = {
     "head": ("head", "skull"),
 }
 _HELPER = re.compile(r"dummy|twist|roll|nub|helper|effector|(^|[^a-z])ik([^a-z]|$)|end$|site$")
+_SAY_ROLE = "say --role ROLE=JOINT, or ROLE = 'JOINT' under [roles] in kumite.toml"
 _SIDE_WORDS = {"left": "left", "right": "right", "l": "left", "r": "right"}
+_EMPTY_WORDS = ("bip", "mixamorig", "jnt", "bone", "def", "org", "bend")
+_NEARLY_ALL = 0.8  # of the names begin with a word that says nothing
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 
 
@@ -95,8 +99,7 @@ def find_roles(skeleton: Skeleton, given: Mapping[str, str] | None = None) -> Fo
     if missing:
         shown = ", ".join(skeleton.names[:60]) + (" …" if len(skeleton) > 60 else "")
         raise KumiteError(
-            f"no {_listed(missing)} to be found among the joints: {shown}; expected a mapping from "
-            f"role to joint name"
+            f"no {_listed(missing)} to be found among the joints: {shown}; {_SAY_ROLE}"
         )
     for parts in (ARM_ROLES[1:], LEG_ROLES[:3]):
         for above, below in itertools.pairwise(parts):
@@ -105,8 +108,7 @@ def find_roles(skeleton: Skeleton, given: Mapping[str, str] | None = None) -> Fo
                 if a == b or a not in _ancestors(skeleton, b):
                     raise KumiteError(
                         f"{side}_{below} ({skeleton.names[b]!r}) is not below {side}_{above} "
-                        f"({skeleton.names[a]!r}); expected a limb's joints in a row, or a mapping "
-                        "from role to joint name"
+                        f"({skeleton.names[a]!r}); expected a limb's joints in a row: {_SAY_ROLE}"
                     )
     return FoundRoles({r: joints[r] for r in ROLES if r in joints}, how)
 
@@ -120,9 +122,7 @@ def _listed(names: list[str]) -> str:
 
 def split_name(name: str) -> tuple[str, str | None]:
     """A joint's part and side: ``mixamorig:LeftForeArm`` is ``('forearm', 'left')``."""
-    bare = re.split(r"[:|]", name)[-1]
-    words = [w.lower() for w in _WORD.findall(bare)]
-    words = [w for w in words if not w.isdigit() and w not in ("bip", "mixamorig", "jnt", "bone")]
+    words = [w for w in _words(name) if w not in _EMPTY_WORDS]
     for at in (0, -1, *range(1, max(len(words) - 1, 1))):
         if words and at < len(words) and words[at] in _SIDE_WORDS:
             side = _SIDE_WORDS[words[at]]
@@ -139,10 +139,35 @@ def split_name(name: str) -> tuple[str, str | None]:
     return joined, None
 
 
+def _words(name: str) -> list[str]:
+    """The words of a name behind its namespace, in lower case and without numbers."""
+    words = (w.lower() for w in _WORD.findall(re.split(r"[:|]", name)[-1]))
+    return [w for w in words if not w.isdigit()]
+
+
+def _without_prefix(names: tuple[str, ...]) -> list[str]:
+    """Names without the words that nearly all of them begin with: ``CC_Base_``, ``Robot_``."""
+    bare = [re.split(r"[:|]", n)[-1] for n in names]
+    while True:
+        first = Counter(w[0] for w in map(_words, bare) if len(w) > 1)
+        word, count = first.most_common(1)[0] if first else ("", 0)
+        if count < _NEARLY_ALL * len(names) or word in _SIDE_WORDS:
+            return bare
+        bare = [_behind(word, n) for n in bare]
+
+
+def _behind(word: str, name: str) -> str:
+    """A name behind its first word, where it is this one and not all that there is."""
+    found = next((m for m in _WORD.finditer(name) if not m.group().isdigit()), None)
+    if found is None or found.group().lower() != word or len(_words(name)) == 1:
+        return name
+    return name[found.end() :]
+
+
 def _by_names(skeleton: Skeleton) -> dict[str, int]:
     """Roles that names settle; ambiguous parts (shoulder, hip, leg) by their company."""
     parts: dict[tuple[str | None, str], int] = {}
-    for j, name in enumerate(skeleton.names):
+    for j, name in enumerate(_without_prefix(skeleton.names)):
         part, side = split_name(name)
         bare = re.split(r"[:|]", name)[-1]
         if not _HELPER.search(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", bare).lower()):
@@ -264,6 +289,10 @@ def _trunk(skeleton: Skeleton, joints: Mapping[str, int]) -> dict[str, int]:
     if "left_upper_arm" in joints and "right_upper_arm" in joints:
         arms = (joints["left_upper_arm"], joints["right_upper_arm"])
         chest = common_ancestor(skeleton, *arms)
+        if chest in (joints.get("neck"), joints.get("head")):
+            # Clavicles that hang on the neck (3ds Max Biped): the chest is what the neck hangs on.
+            top = int(skeleton.parents[chest])
+            chest = chest if top in (NO_PARENT, found.get("pelvis")) else top
         if chest == found.get("pelvis"):
             # Arms that hang on the hips leave the spine beside them: its first joint then.
             spine = [c for c in skeleton.children(chest) if _is_spine(skeleton.names[c])]

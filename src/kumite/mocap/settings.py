@@ -6,6 +6,9 @@ up_axis = "Y"
 ground_height = 0.02          # m
 file_fps = 120                # where files do not state their rate, or state a wrong one
 fps = 30                      # resample everything to this rate
+encoding = "shift_jis"        # of joint names
+joint_positions = "offsets"   # position channels below the hips count for nothing
+keep_t_pose = true            # frames that stand apart at a take's ends stay
 
 [roles]
 head = "Skull"
@@ -27,8 +30,10 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 from kumite import toml
 from kumite.clip import ROLES
 from kumite.errors import KumiteError, at
+from kumite.mocap.text import short
 
 FILE_NAME = "kumite.toml"
+JOINT_POSITIONS = ("channels", "offsets")
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 
@@ -39,11 +44,14 @@ class FileSettings(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
     metres_per_unit: _Positive | None = None
-    up_axis: Literal["Y", "Z"] | None = None
+    up_axis: Literal["Y", "Z", "X", "-Y", "-Z", "-X"] | None = None
     ground_height: _Finite | None = None  # m
     file_fps: _Positive | None = None  # frames a second of the file
     roles: dict[str, str] | None = None  # role -> joint name
     name: str | None = Field(default=None, min_length=1)
+    encoding: str | None = Field(default=None, min_length=1)
+    joint_positions: Literal["channels", "offsets"] | None = None
+    keep_t_pose: bool | None = None
 
     @field_validator("up_axis", mode="before")
     @classmethod
@@ -82,11 +90,15 @@ def read_settings(folder: Path) -> FolderSettings | None:
         raise KumiteError(f"{path}: cannot be read ({error})") from None
     settings = toml.parse(source, path, FolderSettings)
     for name in settings.files:
-        if not (folder / name).is_file():
+        try:
+            there = (folder / name).is_file()
+        except (OSError, ValueError):  # too long for a name, or a NUL in it
+            there = False
+        if not there:
             raise at(
                 path,
                 toml.line_of(source, "files", name),
-                f"files.{name!r}: no such file; expected a path below {folder}",
+                f"files.{short(name)!r}: no such file; expected a path below {folder}",
             )
     return settings
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import codecs
+import contextlib
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,28 +16,87 @@ from kumite.kernels import parse
 
 LARGEST = 1e9  # a length or angle beyond this is damage, and its square would overflow further on
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+_ENCODING = "say --encoding, or encoding in kumite.toml"
 _SHOWN = 40  # characters of a bad token that an error repeats
 
 
 def read_bytes(path: Path) -> bytes:
-    """A file's bytes with ``\\n`` line ends and no byte order mark.
+    """A UTF-8 file's bytes with ``\\n`` line ends and no byte order mark.
 
     Errors: missing, unreadable, empty, not text.
     """
+    data = _bytes(path).removeprefix(codecs.BOM_UTF8)
+    if data[:2] in _UTF_16 or b"\0" in data[:4096]:
+        raise KumiteError(f"{path}: not a plain text file; expected UTF-8")
+    return _line_ends(data)
+
+
+def read_text(path: Path, encoding: str | None = None) -> tuple[bytes, tuple[str, ...]]:
+    """A text file's bytes as UTF-8 with ``\\n`` line ends, and a note if it was something else.
+
+    A file in no stated encoding that is not UTF-8 is taken for Shift-JIS where it holds bytes that
+    Western text has not, else for Western text (Windows-1252).
+
+    Errors: missing, unreadable, empty, not text; an unknown encoding, bytes that it has not.
+    """
+    data = _bytes(path)
+    if encoding is not None:
+        return _line_ends(_transcoded(path, data, encoding)), ()
+    if data[:2] in _UTF_16:
+        return _line_ends(_transcoded(path, data, "utf-16")), ("read as UTF-16",)
+    data = data.removeprefix(codecs.BOM_UTF8)
+    if b"\0" in data[:4096]:
+        raise KumiteError(f"{path}: not a plain text file; expected text, such as UTF-8")
+    if data.isascii():
+        return _line_ends(data), ()
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError:
+        name, text = _guessed(data)
+        return _line_ends(text.encode("utf-8")), (f"not UTF-8, read as {name}; else {_ENCODING}",)
+    return _line_ends(data), ()
+
+
+def _bytes(path: Path) -> bytes:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise KumiteError(f"{path}: cannot be read ({error.strerror})") from None
+        raise KumiteError(f"{short(path)}: cannot be read ({error.strerror})") from None
     except ValueError:  # a path with a NUL in it
-        raise KumiteError(f"{str(path)!r}: not a path") from None
-    data = data.removeprefix(b"\xef\xbb\xbf")
-    if not data.strip():
+        raise KumiteError(f"{short(path)!r}: not a path") from None
+    if not data.removeprefix(codecs.BOM_UTF8).strip():
         raise KumiteError(f"{path}: the file is empty")
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\0" in data[:4096]:
-        raise KumiteError(f"{path}: not a plain text file; expected UTF-8")
-    if b"\r" in data:
-        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     return data
+
+
+def _line_ends(data: bytes) -> bytes:
+    return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
+
+
+def _transcoded(path: Path, data: bytes, encoding: str) -> bytes:
+    try:
+        return data.decode(encoding).removeprefix("\ufeff").encode("utf-8")
+    except (LookupError, AttributeError, TypeError, ValueError) as error:
+        if isinstance(error, UnicodeDecodeError):
+            line = data.count(b"\n", 0, error.start) + 1
+            byte = f"byte 0x{data[error.start]:02x} is not {shown(encoding)}"
+            raise at(path, line, f"{byte}; expected another encoding") from None
+        raise KumiteError(
+            f"unknown encoding {shown(encoding)}; expected one that Python knows, such as "
+            "shift_jis, cp1252, gbk or euc_kr"
+        ) from None
+
+
+def _guessed(data: bytes) -> tuple[str, str]:
+    """The name of an 8-bit encoding, and the text of ``data`` in it."""
+    if re.search(rb"[\x81-\x9f\xe0-\xfc][\x40-\xfc]", data) and re.search(rb"[\x81-\x9f]", data):
+        with contextlib.suppress(UnicodeDecodeError):
+            return "Shift-JIS", data.decode("cp932")
+    try:
+        return "Windows-1252", data.decode("cp1252")
+    except UnicodeDecodeError:
+        return "Latin-1", data.decode("latin-1")
 
 
 def decode(path: Path, data: bytes, line: int = 1) -> str:
@@ -49,6 +110,12 @@ def decode(path: Path, data: bytes, line: int = 1) -> str:
         ) from None
 
 
+def short(path: Path | str) -> str:
+    """A path as an error repeats it: not longer than a file system allows."""
+    text = str(path)
+    return text if len(text) <= 200 else text[:200] + "…"
+
+
 def shown(token: str | bytes) -> str:
     """A token as an error repeats it: quoted, on one line, not too long."""
     if isinstance(token, bytes):
@@ -60,6 +127,8 @@ def number(path: Path, line: int, token: str | bytes, what: str) -> float:
     """One finite number. Errors: anything else, with file, line, token and ``what`` it is for."""
     text = token.decode("utf-8", "replace") if isinstance(token, bytes) else token
     if not _NUMBER.fullmatch(text):
+        if _NUMBER.fullmatch(text.replace(",", ".", 1)):
+            what = f"a decimal point, and {what}"
         raise at(path, line, f"{shown(text)} is not a number; expected {what}")
     value = float(text)
     if not abs(value) <= LARGEST:
@@ -74,6 +143,7 @@ class Table:
     values: np.ndarray  # numbers in the order of the text, flat
     tokens: int
     refused: int | None  # first byte of a token that does not fit its column, if any
+    broken: int | None = None  # byte of the first line end within a period, if any
 
 
 def read_table(data: bytes, columns: Sequence[str | None]) -> Table:
@@ -91,7 +161,7 @@ def read_table(data: bytes, columns: Sequence[str | None]) -> Table:
     most = len(data) // 2 + 1
     out = np.empty(most)
     inexact = np.empty((most, 3), dtype=np.int64)
-    tokens, numbers, hard, refused = parse.parse_table(
+    tokens, numbers, hard, refused, broken = parse.parse_table(
         np.frombuffer(data, np.uint8),
         np.frombuffer(b"".join(blobs) or b"\0", np.uint8),
         word_start,
@@ -105,7 +175,11 @@ def read_table(data: bytes, columns: Sequence[str | None]) -> Table:
     if refused == parse.NO_BYTE and not np.all(np.abs(values) <= LARGEST):
         index = int(np.argmax(~(np.abs(values) <= LARGEST)))
         return Table(values, tokens, _byte_of_number(data, columns, index))
-    return Table(values, tokens, None if refused == parse.NO_BYTE else int(refused))
+    return Table(values, tokens, _byte(refused), _byte(broken))
+
+
+def _byte(found: int) -> int | None:
+    return None if found == parse.NO_BYTE else int(found)
 
 
 def _byte_of_number(data: bytes, columns: Sequence[str | None], index: int) -> int:
@@ -137,7 +211,8 @@ def rate_of(frame_time: float, text: str) -> float:
     last digit and one per cent; otherwise simply the inverse.
     """
     mantissa, _, exponent = text.lower().partition("e")
-    decimals = len(mantissa.partition(".")[2]) - int(exponent or 0)
+    decimals = len(mantissa.partition(".")[2]) - (int(exponent[:6]) if exponent else 0)
+    decimals = max(min(decimals, 300), -300)
     unit = 10.0**-decimals
     exact = 1.0 / frame_time
     if np.any(np.abs(_RATES - exact) < 1e-9 * exact):
