@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import subprocess
 import sys
 import tomllib
 from pathlib import Path
+
+import pytest
 
 import kumite
 from kumite.scene import catalogue, load_scene, settings
@@ -106,3 +109,41 @@ def test_without_a_place_to_keep_kernels_it_runs_and_says_so(tmp_path: Path):
         (hits, where), said = _kept(**{"KUMITE_CACHE": None, "NUMBA_CACHE_DIR": None, **named})
         assert hits == "0" and not Path(where).exists()  # a temporary one, gone with the process
         assert said.count("\n") == 1 and "name a folder to keep them in with KUMITE_CACHE" in said
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (
+            OSError(errno.EACCES, "Permission denied", "/opt/scenes"),
+            "/opt/scenes: Permission denied",
+        ),
+        (OSError(errno.EMFILE, "Too many open files"), "Too many open files"),
+    ],
+)
+def test_what_the_system_refuses_is_said_as_it_is(
+    run, monkeypatch: pytest.MonkeyPatch, error: OSError, said: str
+):
+    def refuse() -> list[str]:
+        raise error
+
+    monkeypatch.setattr(catalogue, "names", refuse)
+    assert run("scenes") == (2, "", f"error: {said}\n")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="pipes break otherwise there")
+@pytest.mark.parametrize("args", [["scenes"], ["scenes", "--json"], ["--help"]])
+def test_nobody_reads_on(args: list[str]):
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "kumite", *args]
+    done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (1, "")
+
+
+def test_with_no_output_at_all_it_runs(tmp_path: Path):
+    program = "import sys; sys.stdout = None; from kumite import cli; cli.main()"
+    command = [sys.executable, "-c", program, "scenes", "--json"]
+    done = subprocess.run(command, stderr=subprocess.PIPE, text=True)
+    assert (done.returncode, done.stderr) == (0, "")

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import subprocess
 import sys
 import tempfile
@@ -505,10 +504,20 @@ def run_all(
 def _main(name: str, folder: str) -> None:
     function, unit, limit = _FIGURES[name]
     value = function(Path(folder))
-    who = resource.RUSAGE_CHILDREN if function is _cold else resource.RUSAGE_SELF
-    peak = resource.getrusage(who).ru_maxrss * (1 if sys.platform == "darwin" else 1024) / 1e6
-    row = {"name": name, "value": value, "unit": unit, "limit": limit, "peak_mb": round(peak, 1)}
+    peak = _peak_mb(children=function is _cold)
+    row = {"name": name, "value": value, "unit": unit, "limit": limit, "peak_mb": peak}
     print(json.dumps(row))
+
+
+def _peak_mb(children: bool) -> float | None:
+    """The most memory [MB] that this process, or its children, had; None where nobody tells."""
+    try:
+        import resource
+    except ModuleNotFoundError:  # Windows
+        return None
+    who = resource.RUSAGE_CHILDREN if children else resource.RUSAGE_SELF
+    peak = resource.getrusage(who).ru_maxrss * (1 if sys.platform == "darwin" else 1024) / 1e6
+    return round(peak, 1)
 
 
 if __name__ == "__main__":

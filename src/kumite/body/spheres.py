@@ -165,7 +165,7 @@ def save_spheres(path: Path | str, spheres: Spheres, skeleton: Skeleton) -> None
             f"radius = {r:.4f}\n"
         )
     with writing(path) as temporary:
-        temporary.write_text("".join(rows), "utf-8")
+        temporary.write_text("".join(rows), "utf-8", newline="\n")
 
 
 def load_spheres(path: Path | str, skeleton: Skeleton) -> Spheres:

@@ -20,7 +20,7 @@ app = typer.Typer(
     epilog="Start with: kumite studio sparring (the built-in performer, no download).",
 )
 # Lines are never broken, so that what is piped on can be searched; nor are tables squeezed there.
-_WIDTH = None if sys.stdout.isatty() or "COLUMNS" in os.environ else 200
+_WIDTH = None if (sys.stdout and sys.stdout.isatty()) or "COLUMNS" in os.environ else 200
 out = Console(soft_wrap=True, width=_WIDTH)
 err = Console(stderr=True, soft_wrap=True)
 

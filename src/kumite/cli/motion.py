@@ -369,7 +369,7 @@ def _write_performance(folder: Path, made: Any, stage: Stages) -> None:
         write_bvh(folder / f"{clip.name}.bvh", clip)
         with writing(folder / f"{clip.name}.truth.json") as temporary:
             text = json.dumps(truth_to_json(truth), indent=1)
-            temporary.write_text(text + "\n", encoding="utf-8")
+            temporary.write_text(text + "\n", encoding="utf-8", newline="\n")
 
 
 @app.command()

@@ -383,7 +383,6 @@ def bench(
         table.add_column(column, justify="left" if column in ("figure", "unit") else "right")
     for row in rows:
         limit = "" if row["limit"] is None else f"{row['limit']:g}"
-        table.add_row(
-            row["name"], f"{row['value']:.4g}", row["unit"], limit, f"{row['peak_mb']:.0f}"
-        )
+        peak = "" if row["peak_mb"] is None else f"{row['peak_mb']:.0f}"
+        table.add_row(row["name"], f"{row['value']:.4g}", row["unit"], limit, peak)
     out.print(table)

@@ -233,7 +233,7 @@ def write_table(
     if keep and path.exists():
         table = _merged(path, _read(path), table, again=True)
     with files.writing(path) as temporary:
-        temporary.write_text(_source(table), "utf-8")
+        temporary.write_text(_source(table), "utf-8", newline="\n")
     return table
 
 
