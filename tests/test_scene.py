@@ -11,11 +11,12 @@ from hypothesis import strategies as st
 
 from kumite import files
 from kumite.body import ARMS
-from kumite.clip import tip_positions
+from kumite.clip import concatenate, tip_positions
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Library, build_library
 from kumite.kernels import blow as kernels
 from kumite.kernels import crowd, near
+from kumite.performer import perform
 from kumite.rotation import from_yaw
 from kumite.scene import (
     Event,
@@ -602,3 +603,29 @@ def test_five_minutes_of_the_real_boxer(boxer: Library):
             assert c.join_jump_m_s <= 0.3
     assert all(n >= 30 for n in landed.values())  # one in ten seconds
     assert np.mean(facing) >= 0.8 and max(skate) <= 1.5
+
+
+def test_two_of_one_clip_do_not_move_in_step():
+    """What one clip offers is little, and two who see the same of each other choose alike."""
+    (jab,) = [c for c in perform("boxing", 0).clips if c.name == "jab"]
+    thin = build_library(concatenate([jab]))
+    for seed in range(10):
+        scene = LiveScene(load_scene("sparring"), thin, seed=seed)
+        apart = []
+        for _ in range(round(10 * scene.fps)):
+            scene.step()
+            apart.append(abs(int(scene.cast.frame[0]) - int(scene.cast.frame[1])))
+        assert np.mean(np.array(apart) <= 2) < 0.1, seed
+        assert any(e.kind == "hit" for e in scene.events), seed
+
+
+def test_who_chooses_at_the_same_moment_does_not_choose_the_same(library: Library):
+    scene = LiveScene(load_scene("sparring"), library, seed=1)
+    cast = scene.cast
+    state = int(np.argmax(np.diff(library.table.action_start)))
+    for k in range(2):  # twins: in one state, one before the other
+        cast.place(k, state, np.array([0.0, k, k * np.pi]))
+    scene.floor.start()
+    scene.step()
+    first = library.table.first[scene.fighters.choices.stretch]
+    assert abs(int(first[0]) - int(first[1])) > scene.fighters.minds.step

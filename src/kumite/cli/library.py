@@ -10,6 +10,8 @@ from kumite.cli.app import out, print_json
 from kumite.errors import KumiteError
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from kumite.graph import Library
     from kumite.graph.preparing import Preparing
 
@@ -32,6 +34,8 @@ def library_values(library: Library) -> dict[str, Any]:
     """What a library holds, as JSON values: how it was built, then what is counted here."""
     import numpy as np
 
+    from kumite.graph import assess
+
     clips = library.clips
     values = {
         "level": "frames" if library.actions is None else "actions",
@@ -39,6 +43,7 @@ def library_values(library: Library) -> dict[str, Any]:
         "clips": len(clips.names),
         "avoidance_parts": len(library.avoidance),
     }
+    values["worth"] = assess(library).to_json()
     if library.preparing is not None:
         values["target_motions"] = _target_values(library.preparing)
     if library.actions is not None:
@@ -101,6 +106,21 @@ def library_lines(library: Library) -> list[str]:
     if len(joined):
         lines.append(f"mean join cost {joined.mean():.2f} rad")
     return lines
+
+
+def worth_table(library: Library) -> Table:
+    """What a library is worth: what of its clips it reaches, its joins, scenes it is good for."""
+    from rich.table import Table
+    from rich.text import Text
+
+    from kumite.graph import assess
+
+    table = Table(title="what it is worth", show_header=False)
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    for label, text in assess(library).rows():
+        table.add_row(Text(label), Text(text))
+    return table
 
 
 def _preparation_lines(library: Library) -> list[str]:
@@ -186,5 +206,6 @@ def show_library(path: Path | str, plot: Path | None, as_json: bool, given: list
         return
     for line in library_lines(library):
         out.print(line, markup=False, highlight=False)
+    out.print(worth_table(library))
     if plot is not None:
         out.print(f"wrote {plot}", markup=False, highlight=False)

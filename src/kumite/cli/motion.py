@@ -9,7 +9,13 @@ import typer
 from rich.table import Table
 
 from kumite.cli.app import JsonOption, Stages, app, err, out, print_json, progress
-from kumite.cli.library import is_library, library_lines, library_values, show_library
+from kumite.cli.library import (
+    is_library,
+    library_lines,
+    library_values,
+    show_library,
+    worth_table,
+)
 from kumite.cli.reading import FpsOption, Reading, SkipBad, Source, reads_mocap
 from kumite.errors import KumiteError, unknown
 
@@ -185,6 +191,20 @@ def build(
         int | None,
         typer.Option(help="Preparation: as many found targets of one name at most (default 4)."),
     ] = None,
+    join_height: Annotated[
+        float | None,
+        typer.Option(help="The most that a join may raise or lower the pelvis [m] (default 0.15)."),
+    ] = None,
+    join_angle: Annotated[
+        float | None,
+        typer.Option(help="The most that a join may turn any joint [rad] (default 1.5)."),
+    ] = None,
+    join_speed: Annotated[
+        float | None,
+        typer.Option(
+            help="The most that a join may change the pelvis' velocity [m/s] (default 3)."
+        ),
+    ] = None,
     as_json: JsonOption = False,
     fps: FpsOption = None,
     skip_bad: SkipBad = False,
@@ -195,12 +215,14 @@ def build(
     from kumite.annotate import read_actions, read_avoidance
     from kumite.files import refuse_unwritable
     from kumite.graph import (
+        JoinBound,
         build_action_library,
         build_avoidance_library,
         build_library,
         save_library,
     )
 
+    bound = JoinBound(**_given(height=join_height, angle=join_angle, speed=join_speed))
     if avoidance and level == "preparation":
         raise KumiteError("--avoidance: of other levels; expected none with --level preparation")
     if most is not None and actions is not None:
@@ -225,17 +247,17 @@ def build(
         stages, clips = Stages(bars), loaded.clip_set()
         parts = read_avoidance(actions, clips) if avoidance and actions else avoidance
         if level == "frames":
-            given = _given(event=event, per_second=per_second)
+            given = _given(event=event, per_second=per_second, bound=bound)
             library = build_library(clips, **given, avoidance=parts, progress=stages)
         elif level == "avoidance":
-            given = _given(every=every, offered=offered)
+            given = _given(every=every, offered=offered, bound=bound)
             library = build_avoidance_library(clips, parts, **given, progress=stages)
         elif level == "preparation":
-            given = _given(alike=alike, threshold=threshold)
+            given = _given(alike=alike, threshold=threshold, bound=bound)
             library = _preparation(clips, actions, _given(most=most), given, stages)
         else:
             mine = None if actions is None else read_actions(actions, clips)
-            given = _given(alike=alike, most_ways=most_ways)
+            given = _given(alike=alike, most_ways=most_ways, bound=bound)
             library = build_action_library(clips, mine, **given, avoidance=parts, progress=stages)
     save_library(output, library)
     if as_json:
@@ -246,6 +268,7 @@ def build(
     wrote = f"wrote {output} ({output.stat().st_size / 1e6:.1f} MB)"
     for line in (*library_lines(library), wrote):
         out.print(line, markup=False, highlight=False)
+    out.print(worth_table(library))
     mean = library.report["mean_action_s"]
     if level == "frames" and mean < SHORTEST_ACTION:
         err.print(

@@ -13,7 +13,10 @@ from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.kernels import crowd as kernels
 from kumite.kernels import policy as kernels_policy
+from kumite.kernels.blow import NOBODY
 from kumite.kernels.look_ahead import Behaviours, Moves
+
+IN_STEP = 0.2  # s: of two who face each other none begins what the other began so shortly before
 
 
 @dataclass
@@ -153,6 +156,9 @@ class Fighters:
             np.full((count, memory), -1, dtype=np.int64),
             np.zeros(count, dtype=np.int64),
             np.random.SeedSequence(seed).generate_state(count, np.uint64),
+            skill.library.table.first.astype(np.int64),
+            np.full(count, NOBODY, dtype=np.int64),
+            round(IN_STEP * skill.library.clips.fps),
         )
         self.choices = kernels.Choices(
             np.zeros(count, dtype=np.int64),

@@ -1,5 +1,6 @@
 """The motion graph: pose distance, transitions, components, the action table, the library file."""
 
+from kumite.graph.assess import Assessment, JoinQuality, Spread, Verdict, assess
 from kumite.graph.avoiding import build_avoidance_library, find_avoiding_transitions
 from kumite.graph.builtin import builtin_library
 from kumite.graph.distance import PoseFeatures, pose_features
@@ -12,6 +13,7 @@ from kumite.graph.hierarchy import (
     build_hierarchy,
     hierarchy_table,
 )
+from kumite.graph.joins import JoinBound, JoinMeter, Jumps
 from kumite.graph.library import Library, build_library, load_library, save_library
 from kumite.graph.preparing import Preparing
 from kumite.graph.table import ActionTable, fold
@@ -20,12 +22,20 @@ from kumite.graph.whole import build_action_library
 
 __all__ = [
     "ActionTable",
+    "Assessment",
     "Hierarchy",
+    "JoinBound",
+    "JoinMeter",
+    "JoinQuality",
+    "Jumps",
     "Library",
     "PoseFeatures",
     "Preparing",
+    "Spread",
     "Targets",
     "Transitions",
+    "Verdict",
+    "assess",
     "authored_targets",
     "build_action_library",
     "build_avoidance_library",

@@ -17,6 +17,7 @@ from kumite.annotate import AvoidanceParts, Strikes, find_contacts, find_strikes
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError
 from kumite.graph.distance import PoseFeatures, pose_features, squared_distances
+from kumite.graph.joins import JoinBound
 from kumite.graph.library import Library, chosen_parts, folded, with_parts
 from kumite.graph.transitions import Transitions
 from kumite.rotation import planar_apply, planar_compose, planar_inverse
@@ -46,11 +47,13 @@ def build_avoidance_library(
     offered: int = OFFERED,
     worst: float = WORST,
     blows: bool = False,
+    bound: JoinBound | None = None,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> Library:
     """A library whose graph is made of :func:`find_avoiding_transitions`.
 
     avoidance: its parts; True: as they are found. blows: whether some are offered after each.
+    bound: the farthest that a join may jump; None: the usual (:class:`JoinBound`).
     Errors: there are no parts.
     """
     progress("finding contacts and effective hits")
@@ -63,7 +66,8 @@ def build_avoidance_library(
     progress("folding the graph")
     told = {"level": "avoidance", "every": every, "offered": offered, "worst": worst}
     told |= {"blows": True} if blows else {}
-    return with_parts(folded(clips, contacts, strikes, transitions, parts, told), avoidance)
+    library = folded(clips, contacts, strikes, transitions, parts, told, bound)
+    return with_parts(library, avoidance)
 
 
 def find_avoiding_transitions(

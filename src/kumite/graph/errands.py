@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import asdict
 
 import numpy as np
 
@@ -21,7 +22,15 @@ from kumite.body import lay_body
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError
 from kumite.graph.distance import pose_features
-from kumite.graph.hierarchy import ALIKE, Targets, build_hierarchy, check_targets, hierarchy_table
+from kumite.graph.hierarchy import (
+    ALIKE,
+    Hierarchy,
+    Targets,
+    build_hierarchy,
+    check_targets,
+    hierarchy_table,
+)
+from kumite.graph.joins import JoinBound, JoinMeter
 from kumite.graph.library import Library, counted
 from kumite.graph.preparing import Preparing, find_about, own_blows
 
@@ -33,6 +42,7 @@ def build_preparation_library(
     *,
     alike: float = ALIKE,
     threshold: float = LEGS,
+    bound: JoinBound | None = None,
     contacts: Contacts | None = None,
     strikes: Strikes | None = None,
     progress: Callable[[str], None] = lambda stage: None,
@@ -41,9 +51,10 @@ def build_preparation_library(
 
     cycles: the cores; None: as they are found outside of the targets. alike [rad], threshold
     [rad²]: see :func:`build_hierarchy` and :func:`find_reference`. A target is entered up to its
-    reference posture, and left from where what it is about is over. contacts, strikes: of these
-    clips, if they are known. Errors: no targets, no cycles; frames that are no part of one clip;
-    limits out of range.
+    reference posture, and left from where what it is about is over. bound: the farthest that a join
+    may jump; None: the usual (:class:`JoinBound`): a target whose best way in or out jumps farther
+    is left out. contacts, strikes: of these clips, if they are known. Errors: no targets, no
+    cycles; frames that are no part of one clip; limits out of range.
     """
     if len(targets) == 0:
         raise KumiteError("no target motion; expected at least one to prepare for")
@@ -68,15 +79,34 @@ def build_preparation_library(
     blows = own_blows(clips, strikes)
     about = [find_about(clips, blows, targets, t, int(reference[t]), body) for t in range(count)]
     progress("comparing poses")
-    hierarchy = build_hierarchy(
-        clips,
-        cycles,
-        targets,
-        alike=alike,
-        features=pose_features(clips),
-        latest=reference,
-        earliest=np.array([a.past for a in about]),
-    )
+    bound, features = bound or JoinBound(), pose_features(clips)
+
+    def hierarchy_of(targets: Targets) -> Hierarchy:
+        past = np.array([a.past for a in about])
+        return build_hierarchy(
+            clips,
+            cycles,
+            targets,
+            alike=alike,
+            features=features,
+            latest=reference,
+            earliest=past,
+        )
+
+    hierarchy = hierarchy_of(targets)
+    fits = _fits(clips, hierarchy, bound)
+    over = [label for label, fit in zip(targets.label, fits.tolist()) if not fit]
+    if len(over) == count:
+        raise KumiteError(
+            f"none of {count} target motion(s) joins a cycle within the bound; expected at most "
+            f"{bound.height:g} m (--join-height), {bound.angle:g} rad (--join-angle) and "
+            f"{bound.speed:g} m/s (--join-speed) for one"
+        )
+    if over:
+        kept = np.flatnonzero(fits)
+        targets, reference, count = targets.take(kept), reference[kept], len(kept)
+        references, about = [references[t] for t in kept], [about[t] for t in kept]
+        hierarchy = hierarchy_of(targets)
     progress("making the action table")
     table, what = hierarchy_table(clips, hierarchy)
     preparing = Preparing(
@@ -92,22 +122,34 @@ def build_preparation_library(
         np.array([a.way for a in about]),
         np.array([a.past for a in about]),
     )
-    kept = np.zeros(len(clips), dtype=bool)
+    played = np.zeros(len(clips), dtype=bool)
     for first, last in zip(table.first.tolist(), table.last.tolist()):
-        kept[first : last + 1] = True
+        played[first : last + 1] = True
     report = {
         "level": "preparation",
         "alike": float(alike),
         "threshold": float(threshold),
+        "join_bound": asdict(bound),
+        "targets_over_bound": over,
+        "left_out": {"in no cycle, link or target": int((~played).sum())},
         "fps": clips.fps,
         "frames": len(clips),
-        "frames_kept": int(kept.sum()),
+        "frames_kept": int(played.sum()),
         "cores": list(cycles.label),
         "targets": list(targets.label),
         "fall_back": [targets.label[t] for t in range(count) if not references[t].found],
-        **counted(clips, table, strikes, kept),
+        **counted(clips, table, strikes, played),
     }
     return Library(clips, contacts, strikes, table, report, preparing=preparing)
+
+
+def _fits(clips: ClipSet, hierarchy: Hierarchy, bound: JoinBound) -> np.ndarray:
+    """Which targets [T] bool have a best way in and a best way out that keep to a bound."""
+    meter, t = JoinMeter(clips), np.arange(len(hierarchy.targets))
+    into, out = (np.argmin(d, axis=0) for d in (hierarchy.entry_distance, hierarchy.exit_distance))
+    enters = meter.joins(hierarchy.leave[into, t], hierarchy.entry[into, t] + 1)
+    returns = meter.joins(hierarchy.exit[out, t], hierarchy.land[out, t] + 1)
+    return bound.within(enters) & bound.within(returns)
 
 
 def outside(clips: ClipSet, targets: Targets) -> np.ndarray:

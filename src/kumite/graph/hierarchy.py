@@ -57,6 +57,12 @@ class Targets:
     def __len__(self) -> int:
         return len(self.label)
 
+    def take(self, index: Sequence[int] | np.ndarray) -> Targets:
+        """Some of them, by their numbers."""
+        i = np.asarray(index, dtype=np.int64)
+        label = tuple(self.label[t] for t in i.tolist())
+        return Targets(label, self.start[i], self.stop[i], self.mark[i])
+
 
 def authored_targets(clips: ClipSet, truths: Sequence[Truth], fps: float) -> Targets:
     """The target motions of the performer, each label once: of every one the first.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from kumite.clip import ClipSet, Skeleton
 from kumite.errors import KumiteError
 from kumite.graph.distance import pose_features
 from kumite.graph.hierarchy import Hierarchy, Targets
+from kumite.graph.joins import JoinBound, bounded
 from kumite.graph.preparing import Preparing
 from kumite.graph.table import ActionTable, fold
 from kumite.graph.transitions import (
@@ -119,11 +120,13 @@ def build_library(
     per_second: float = PER_SECOND,
     largest_share: float = LARGEST_SHARE,
     avoidance: AvoidanceParts | bool = False,
+    bound: JoinBound | None = None,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> Library:
     """Notes, transitions, component and action table of a set of clips.
 
-    avoidance: parts to keep whole, each within one action of the table (Oshita & Masaoka 2011,
+    bound: the farthest that a join may jump; None: the usual (:class:`JoinBound`). avoidance: parts
+    to keep whole, each within one action of the table (Oshita & Masaoka 2011,
     section 3.1); True: as they are found; False: none. progress is told each stage as it begins.
     Errors: too few frames; no such contact event; parts of other clips.
     """
@@ -144,7 +147,7 @@ def build_library(
     )
     told = {"event": event, "per_second": per_second, "largest_share": largest_share}
     progress("folding the graph")
-    library = folded(clips, contacts, strikes, transitions, parts, told)
+    library = folded(clips, contacts, strikes, transitions, parts, told, bound)
     return with_parts(library, avoidance)
 
 
@@ -155,14 +158,20 @@ def folded(
     transitions: Transitions,
     parts: AvoidanceParts,
     told: Mapping[str, Any],
+    bound: JoinBound | None = None,
 ) -> Library:
     """The library of the connected part of a graph of frames. told: how its transitions were found,
-    for the report. Errors: too few frames.
+    for the report. bound: of joins; None: the usual. Errors: too few frames; no join keeps to it.
     """
+    bound = bound or JoinBound()
+    every, transitions = transitions, bounded(clips, transitions, bound)
     kept = strongest_component(clips, transitions)
     table = fold(clips, transitions, kept)
     report = {
         **told,
+        "join_bound": asdict(bound),
+        "joins_over_bound": len(every) - len(transitions),
+        "left_out": _left_out(clips, every, transitions, kept),
         "fps": clips.fps,
         "frames": len(clips),
         "frames_kept": int(kept.sum()),
@@ -172,6 +181,34 @@ def folded(
         **counted(clips, table, strikes, kept),
     }
     return Library(clips, contacts, strikes, table, report, None, parts)
+
+
+def _left_out(
+    clips: ClipSet, every: Transitions, transitions: Transitions, kept: np.ndarray
+) -> dict[str, int]:
+    """Why frames are not in the graph, and how many. every: transitions over the bound, too."""
+    clip, frame = clips.clip_of_frame, np.arange(len(clips))
+    could = np.zeros(len(clips), dtype=bool)
+    if len(every) > len(transitions):
+        could = strongest_component(clips, every)
+    # Of each clip the last frame to leave from and the first to come to.
+    last, first = np.full(len(clips.names), -1), np.full(len(clips.names), len(clips))
+    np.maximum.at(last, clip[every.source], every.source)
+    np.minimum.at(first, clip[every.target], every.target)
+    out: dict[str, int] = {}
+    left = ~kept
+    for why, these in (
+        ("joins over the bound", could),
+        ("clips without joins", (last[clip] < 0) & (first[clip] == len(clips))),
+        ("after a clip's last way out", frame > last[clip]),
+        ("before a clip's first way in", frame < first[clip]),
+        ("joined only among themselves", np.ones(len(clips), dtype=bool)),
+    ):
+        count = int(np.count_nonzero(left & these))
+        if count:
+            out[why] = count
+        left &= ~these
+    return out
 
 
 def counted(

@@ -10,7 +10,7 @@ where whoever was struck can act again, which may be long before he rests.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 from scipy.cluster.hierarchy import fcluster, linkage
@@ -33,6 +33,7 @@ from kumite.annotate.action_file import SLIVER
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError
 from kumite.graph.distance import pose_features
+from kumite.graph.joins import JoinBound, JoinMeter
 from kumite.graph.library import Library, chosen_parts, with_parts
 from kumite.graph.table import ActionTable
 from kumite.kernels import distance as kernels
@@ -52,6 +53,7 @@ def build_action_library(
     alike: float = ALIKE,
     most_ways: int = MOST_WAYS,
     avoidance: AvoidanceParts | bool = False,
+    bound: JoinBound | None = None,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> Library:
     """Notes and the action-level graph of a set of clips.
@@ -61,12 +63,14 @@ def build_action_library(
     each label that join best, label by label in turn, so that a large capture gives smoother joins
     and not only more of the same. avoidance: parts that no action's end may cut: the action in
     which the middle of one lies plays all of it (:func:`uncut`); True: as they are found; False:
-    none. Errors: no connected part with two actions that can be chosen.
+    none. bound: the farthest that a join may jump; None: the usual (:class:`JoinBound`). Errors: no
+    connected part with two actions that can be chosen.
     """
     if most_ways < 2:
         raise KumiteError(f"most_ways {most_ways}; expected at least 2")
     if not 0 < alike < np.inf:
         raise KumiteError(f"alike {alike}; expected more than 0 rad")
+    bound = bound or JoinBound()
     progress("finding contacts and effective hits")
     contacts, strikes = find_contacts(clips), find_strikes(clips)
     if actions is None:
@@ -82,7 +86,7 @@ def build_action_library(
     strikes = only_blows(
         strikes, (which >= 0) & (strikes.frame < np.append(actions.stop[attack], 0)[which])
     )
-    actions = _recovered(actions, contacts.on_ground, clips.fps)
+    whole, actions = actions, _recovered(actions, contacts.on_ground, clips.fps)
     progress("clustering postures")
     # An action is entered from the frame before it, where its clip has one: then what follows in
     # the capture follows here without a join.
@@ -92,22 +96,25 @@ def build_action_library(
     keep = last > enter
     start_node, end_node, nodes = _postures(clips, enter, last, alike)
     chosen = actions.kind != KINDS.index("reaction")
-    keep = _connected(start_node, end_node, nodes, keep, chosen)
+    alike_enough = _connected(start_node, end_node, nodes, keep, chosen)
+    keep, follows, over = _bounded(
+        clips, (enter, last), (start_node, end_node), alike_enough, chosen, bound
+    )
     usable = keep & chosen
     if usable.sum() < 2 or np.all(actions.kind[usable] == KINDS.index("idle")):
         raise KumiteError(
             f"too few actions for a graph: of {len(actions)} found, {int(usable.sum())} are "
-            "connected and can be chosen; expected at least 2, not only rests (more clips, or a "
-            "larger --alike)"
+            "connected and can be chosen; expected at least 2, not only rests (more clips, a "
+            f"larger --alike, or a wider bound of joins: {over} jump more than {bound.height:g} m "
+            f"--join-height, {bound.angle:g} rad --join-angle or {bound.speed:g} m/s --join-speed)"
         )
     order = np.flatnonzero(keep)
     state_frame = last[order]  # ascending: actions are in order and do not overlap
     joins = _join_costs(clips, state_frame, enter[order])
     words = np.unique([actions.label[a] for a in order], return_inverse=True)[1]
-    offered = [
-        _best_of_each(np.flatnonzero(usable[order] & (start_node[order] == n)), joins[s], words)
-        for s, n in enumerate(end_node[order])
-    ]
+    follows = follows[np.ix_(order, np.flatnonzero(usable))]
+    number = np.flatnonzero(usable[order])
+    offered = [_best_of_each(number[found], joins[s], words) for s, found in enumerate(follows)]
     offered = [np.sort(o[:most_ways]) for o in offered]
     counts = np.array([len(o) for o in offered])
     stretch = np.concatenate(offered)
@@ -124,9 +131,15 @@ def build_action_library(
         np.arange(len(order), dtype=np.int32),
         planar_compose(planar_inverse(facing[first - 1]), facing[state_frame]),
     )
+    frames_kept = np.zeros(len(clips), dtype=bool)
+    for a, b in zip(first.tolist(), state_frame.tolist()):
+        frames_kept[a : b + 1] = True
     report = {
         "level": "actions",
         "alike": alike,
+        "join_bound": asdict(bound),
+        "joins_over_bound": over,
+        "left_out": _left_out(whole, frames_kept, alike_enough & ~keep),
         "fps": clips.fps,
         "frames": len(clips),
         "frames_kept": int(table.duration.sum()),
@@ -238,6 +251,53 @@ def _connected(
         if np.array_equal(left, keep):
             return keep
         keep = left
+
+
+def _bounded(
+    clips: ClipSet,
+    frames: tuple[np.ndarray, np.ndarray],
+    nodes: tuple[np.ndarray, np.ndarray],
+    keep: np.ndarray,
+    chosen: np.ndarray,
+    bound: JoinBound,
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """Of actions that share nodes those [A] that still lead to each other where no join jumps
+    farther than a bound; which follows which [A, A] bool, by choice; and how many pairs jump too
+    far. frames, nodes: that actions are entered from, and end in, each [A].
+    """
+    (enter, last), (start, end) = frames, nodes
+    follows = (end[:, None] == start[None]) & keep[:, None] & keep[None]
+    struck = follows & ~chosen[None]  # a blow comes when it comes: no bound of joins keeps it away
+    follows &= chosen[None]
+    a, b = np.nonzero(follows)
+    over = ~bound.within(JoinMeter(clips).joins(last[a], enter[b] + 1))
+    if not over.any():
+        return keep, follows, 0
+    follows[a[over], b[over]] = False
+    while keep.any():
+        # A posture in which nothing can be chosen would be a dead end.
+        left = keep & follows[:, keep].any(axis=1)
+        edges = (follows | struck) & left[:, None] & left[None]
+        _, part = connected_components(coo_array(edges).tocsr(), connection="strong")
+        inside = left & (part == np.argmax(np.bincount(part[left]))) if left.any() else left
+        if np.array_equal(inside, keep):
+            break
+        keep = inside
+    return keep, follows & keep[:, None] & keep[None], int(over.sum())
+
+
+def _left_out(actions: Actions, kept: np.ndarray, over: np.ndarray) -> dict[str, int]:
+    """Why frames are not in the graph, and how many. kept [F]; over [A]: left out by the bound."""
+    why = np.full(len(kept), -1)
+    reasons = ("joins over the bound", "postures unlike those of others", "after a reaction")
+    recovers = actions.kind == KINDS.index("reaction")
+    for a, (start, stop) in enumerate(zip(actions.start.tolist(), actions.stop.tolist())):
+        reaction = bool(recovers[a] and kept[start:stop].any())
+        why[start:stop] = 0 if over[a] else 2 if reaction else 1
+    why[kept] = -2
+    counts = {reason: int(np.sum(why == k)) for k, reason in enumerate(reasons)}
+    counts["in no action"] = int(np.sum(why == -1))
+    return {reason: count for reason, count in counts.items() if count}
 
 
 def _best_of_each(found: np.ndarray, cost: np.ndarray, word: np.ndarray) -> np.ndarray:

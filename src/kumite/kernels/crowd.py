@@ -59,6 +59,9 @@ class Minds(NamedTuple):
     recent: np.ndarray  # [K, M] stretches, or -1
     recent_at: np.ndarray  # [K] where the next one is written
     seed: np.ndarray  # [K] uint64
+    first: np.ndarray  # [L] library frame that each stretch begins with
+    beside: np.ndarray  # [K] library frame that whom it faces shows as it chooses, or NOBODY
+    step: int  # frames: who begin one motion within so many move in step
 
 
 class Choices(NamedTuple):
@@ -137,6 +140,21 @@ def decide_one(k, state, place, grid, actors, minds, moves, behaviours, horizon,
 
 
 @kernel
+def give_way(k, actors, minds, choices):
+    """Whether k, who has just chosen, must choose once more: for the one it faces has, too, in the
+    same moment, and the same."""
+    o = actors.opponent[k]
+    if o == NOBODY or o > k or actors.frame[o] < actors.stop[o]:
+        return False
+    minds.beside[k] = minds.first[choices.stretch[o]]
+    if abs(minds.first[choices.stretch[k]] - minds.beside[k]) > minds.step:
+        return False
+    if minds.recent.shape[1]:  # what it does not do is not what it has done
+        minds.recent_at[k] = (minds.recent_at[k] - 1) % minds.recent.shape[1]
+    return True
+
+
+@kernel
 def weigh_again(many, state, target, allowed, moves, behaviours, weights, facing, worth):
     """The best ``many`` of the allowed actions are weighed by two backups: worth [n], in place.
 
@@ -150,6 +168,21 @@ def weigh_again(many, state, target, allowed, moves, behaviours, weights, facing
             done += 1
         else:
             allowed[n] = False
+
+
+@kernel
+def keep_out_of_step(k, begin, minds, moves, gain):
+    """No two who face each other do the same at the same time, where there is anything else to do:
+    actions that would are left out, gain [n] in place.
+    """
+    count, left = gain.shape[0], 0
+    for n in range(count):
+        left += gain[n] > -np.inf
+    for n in range(count):
+        late = minds.first[moves.stretch[begin + n]] - minds.beside[k]
+        if left > 1 and gain[n] > -np.inf and abs(late) <= minds.step:
+            gain[n] = -np.inf
+            left -= 1
 
 
 @kernel
@@ -183,6 +216,8 @@ def pick(k, state, target, others, minds, moves, behaviours, choices):
             if minds.recent[k, m] == moves.stretch[begin + n]:
                 gain[n] -= temper[BOREDOM] * abs(gain[n])
                 break
+    if minds.beside[k] != NOBODY:
+        keep_out_of_step(k, begin, minds, moves, gain)
     few = min(int(temper[FEW]), count)
     best = np.empty(few, dtype=np.int64)
     kept = 0
@@ -483,9 +518,16 @@ def _step(
     """
     place = played.poses.root_position
     for w in prange(who.shape[0]):
+        o = actors.opponent[who[w]]
+        minds.beside[who[w]] = NOBODY if o == NOBODY else actors.frame[o]
         decide_one(
             who[w], states[w], place, grid, actors, minds, moves, behaviours, horizon, choices
         )
+    for w in range(who.shape[0]):
+        if give_way(who[w], actors, minds, choices):
+            decide_one(
+                who[w], states[w], place, grid, actors, minds, moves, behaviours, horizon, choices
+            )
     begin(who, choices.stretch, played)
     return advance(dt, played, grid, actors.opponent, room, shapes, blows)
 

@@ -178,9 +178,15 @@ class LiveScene:
         # Everyone starts in a state with many ways out: the usual guard, not the end of a blow.
         ways = np.diff(self.library.table.action_start)
         common = np.flatnonzero(ways >= np.quantile(ways, 0.75))
+        free = common.tolist()  # and nobody in another's, while there are states enough
         for k, c in enumerate(self.settings.characters):
             facing = np.array([*c.position, np.radians(c.yaw_deg)])
-            cast.place(k, int(rng.choice(common)), facing)
+            state = int(rng.choice(common))
+            if state not in free:
+                state = int(rng.choice(free))
+            free.remove(state)
+            free = free or common.tolist()
+            cast.place(k, state, facing)
         self.floor.start()
         clips = self.library.clips
         yaws = np.radians([o.yaw_deg for o in self.settings.object])
