@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -65,6 +66,54 @@ FAMILIES: dict[str, tuple[list[str], list[str], list[str], list[str]]] = {
         ["shoulder.L", "upper_arm.L", "forearm.L", "hand.L", "thumb.01.L"],
         ["thigh.L", "shin.L", "foot.L", "toe.L"],
     ),
+    "xsens": (
+        ["Pelvis", "L5", "L3", "T12", "T8"],
+        ["Neck", "Head"],
+        ["LeftShoulder", "LeftUpperArm", "LeftForeArm", "LeftHand"],
+        ["LeftUpperLeg", "LeftLowerLeg", "LeftFoot", "LeftToe"],
+    ),
+    "xsens bvh": (
+        ["Hips", "Chest", "Chest2", "Chest3", "Chest4"],
+        ["Neck", "Head"],
+        ["LeftCollar", "LeftShoulder", "LeftElbow", "LeftWrist"],
+        ["LeftHip", "LeftKnee", "LeftAnkle", "LeftToe"],
+    ),
+    "optitrack": (
+        ["Skeleton1:Hip", "Skeleton1:Ab", "Skeleton1:Chest"],
+        ["Skeleton1:Neck", "Skeleton1:Head"],
+        [f"Skeleton1:L{n}" for n in ("Shoulder", "UArm", "FArm", "Hand")],
+        [f"Skeleton1:L{n}" for n in ("Thigh", "Shin", "Foot", "Toe")],
+    ),
+    "perception neuron": (
+        [f"Robot_{n}" for n in ("Hips", "Spine", "Spine1", "Spine2")],
+        ["Robot_Neck", "Robot_Head"],
+        [f"Robot_Left{n}" for n in ("Shoulder", "Arm", "ForeArm", "Hand", "HandThumb1")],
+        [f"Robot_Left{n}" for n in ("UpLeg", "Leg", "Foot", "ToeBase")],
+    ),
+    "daz": (
+        ["hip", "abdomenLower", "abdomenUpper", "chestLower", "chestUpper"],
+        ["neckLower", "head"],
+        ["lCollar", "lShldrBend", "lForearmBend", "lHand", "lThumb1"],
+        ["lThighBend", "lShin", "lFoot", "lToe"],
+    ),
+    "character creator": (
+        ["CC_Base_Hip", "CC_Base_Waist", "CC_Base_Spine01", "CC_Base_Spine02"],
+        ["CC_Base_NeckTwist01", "CC_Base_Head"],
+        [f"CC_Base_L_{n}" for n in ("Clavicle", "Upperarm", "Forearm", "Hand")],
+        [f"CC_Base_L_{n}" for n in ("Thigh", "Calf", "Foot", "ToeBase")],
+    ),
+    "rigify": (
+        ["DEF-hips", "DEF-spine", "DEF-chest"],
+        ["DEF-neck", "DEF-head"],
+        [f"DEF-{n}.L" for n in ("shoulder", "upper_arm", "forearm", "hand")],
+        [f"DEF-{n}.L" for n in ("thigh", "shin", "foot", "toe")],
+    ),
+    "kinect": (
+        ["SpineBase", "SpineMid", "SpineShoulder"],
+        ["Neck", "Head"],
+        ["ClavicleLeft", "ShoulderLeft", "ElbowLeft", "WristLeft", "HandTipLeft"],
+        ["HipLeft", "KneeLeft", "AnkleLeft", "FootLeft"],
+    ),
     "poser": (
         ["hip", "abdomen", "chest"],
         ["neck", "head"],
@@ -72,7 +121,15 @@ FAMILIES: dict[str, tuple[list[str], list[str], list[str], list[str]]] = {
         ["lThigh", "lShin", "lFoot", "lToe"],
     ),
 }
-_MIRROR = (("Left", "Right"), ("L_", "R_"), (" L ", " R "), ("_l", "_r"), (".L", ".R"), ("l", "r"))
+_MIRROR = (
+    ("Left", "Right"),
+    ("L_", "R_"),
+    (" L ", " R "),
+    ("_l", "_r"),
+    (".L", ".R"),
+    (":L", ":R"),
+    ("l", "r"),
+)
 
 
 def right(name: str) -> str:
@@ -122,6 +179,49 @@ def test_every_role_of_every_family(family: str) -> None:
     found = find_roles(skeleton)
     assert {r: skeleton.names[j] for r, j in found.joints.items()} == expected(family)
     assert set(found.how.values()) <= {"name", "tree"}
+
+
+@pytest.mark.parametrize("family", ["biped", "mixamo", "daz", "xsens bvh"])
+def test_clavicles_may_hang_on_the_neck(family: str) -> None:
+    """As 3ds Max Biped has it; and its thighs, on the first joint of the spine."""
+    spine, neck, arm, leg = FAMILIES[family]
+    skeleton = person(family)
+    names = list(skeleton.names)
+    parents = skeleton.parents.copy()
+    order = list(range(len(names)))
+    for name in (arm[0], right(arm[0])):
+        parents[names.index(name)] = names.index(neck[0])
+    thighs = [names.index(n) for n in (leg[0], right(leg[0]))]
+    parents[thighs] = names.index(spine[1])
+    # Parents before children again: trunk, neck, then all else in its order.
+    first = [names.index(n) for n in (*spine, *neck)]
+    order = first + [j for j in order if j not in first]
+    place = {j: k for k, j in enumerate(order)}
+    moved = Skeleton(
+        tuple(names[j] for j in order),
+        np.array([place.get(int(parents[j]), -1) for j in order]),
+        skeleton.offsets[order],
+    )
+    found = find_roles(moved)
+    wanted = expected(family) | {"pelvis": spine[1], "chest": spine[-1]}
+    assert {r: moved.names[j] for r, j in found.joints.items()} == wanted
+
+
+@pytest.mark.parametrize("count", [2000])
+@pytest.mark.parametrize("shape", ["star", "path", "threes", "bush"])
+def test_roles_of_thousands_of_joints_are_refused_quickly(shape: str, count: int) -> None:
+    k = np.arange(count)
+    parents = {
+        "star": np.where(k > 0, 0, -1),
+        "path": k - 1,
+        "threes": np.where(k % 3 == 1, 0, k - 1),
+        "bush": np.where(k > 0, (k - 1) // 15, -1),
+    }[shape]
+    many = Skeleton(tuple(f"j{j}" for j in k), parents, np.ones((count, 3)))
+    begin = time.process_time()
+    with pytest.raises(KumiteError, match=r"to be found among .* say --role ROLE=JOINT"):
+        find_roles(many)
+    assert time.process_time() - begin < 5  # a square of the joints took minutes
 
 
 @pytest.mark.parametrize("family", FAMILIES)

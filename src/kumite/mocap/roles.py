@@ -47,10 +47,12 @@ _SIDED_BY_JOINT = {
 }
 _AMBIGUOUS = ("shoulder", "leg")
 _MIDDLE = {
-    "neck": ("neck", "lowerneck", "neckbase", "neckbone"),
+    "neck": ("neck", "lowerneck", "necklower", "neckbase", "neckbone", "necktwist"),
     "head": ("head", "skull"),
 }
-_HELPER = re.compile(r"dummy|twist|roll|nub|helper|effector|(^|[^a-z])ik([^a-z]|$)|end$|site$")
+_HELPER = re.compile(
+    r"dummy|twist|roll|nub|helper|effector|(^|[^a-z])ik([^a-z]|$)|(?<!b)end$|site$"
+)
 _SAY_ROLE = "say --role ROLE=JOINT, or ROLE = 'JOINT' under [roles] in kumite.toml"
 _SIDE_WORDS = {"left": "left", "right": "right", "l": "left", "r": "right"}
 _EMPTY_WORDS = ("bip", "mixamorig", "jnt", "bone", "def", "org", "bend")
@@ -170,7 +172,8 @@ def _by_names(skeleton: Skeleton) -> dict[str, int]:
     for j, name in enumerate(_without_prefix(skeleton.names)):
         part, side = split_name(name)
         bare = re.split(r"[:|]", name)[-1]
-        if not _HELPER.search(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", bare).lower()):
+        helper = _HELPER.search(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", bare).lower())
+        if not helper or part in _MIDDLE["neck"]:
             parts.setdefault((side, part), j)  # the first of Neck, Neck1 is the neck
     found: dict[str, int] = {}
     # Rigs that name joints, not bones: a wrist is where the hand begins, and a foot is its ball.
