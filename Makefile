@@ -6,7 +6,7 @@ BIN := .venv/bin
 RUN := .venv/.ready-to-run
 DEV := .venv/.ready-to-test
 
-.PHONY: demo test fast lint bench lock clean
+.PHONY: demo test fast lint bench lock recording clean
 
 demo: $(RUN)
 	$(BIN)/kumite studio sparring
@@ -43,6 +43,10 @@ lock: $(RUN)
 	echo uv | $(LOCK) - -o requirements/uv.txt
 	$(LOCK) pyproject.toml --group build --extra physics -o requirements/run.txt
 	$(LOCK) pyproject.toml --group build --all-extras -c requirements/run.txt -o requirements/dev.txt
+
+# The recorded fight that the studio shows while a scene is prepared for the first time.
+recording: $(RUN)
+	$(BIN)/kumite run sparring --seconds 16 --seed 2 --out src/kumite/studio/sparring.rec
 
 clean:
 	rm -rf .venv build dist .pytest_cache .ruff_cache .hypothesis src/kumite.egg-info

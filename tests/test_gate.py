@@ -16,9 +16,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from kumite.errors import KumiteError
 from kumite.graph import Library
-from kumite.scene import LiveScene, Playback, load_scene
-from kumite.scene.recording import load_recording
-from kumite.studio import FIRST_RECORDING, Studio
+from kumite.scene import LiveScene, load_scene
+from kumite.studio import Interlude, Studio
 from kumite.studio.gate import MOST_LINES, MOST_PAGES, Gate, Names, place_of
 from tests import browser
 from tests.stranger import (
@@ -43,7 +42,7 @@ ASK = "GET / HTTP/1.1\nHost: {host}\n{more}Connection: close\n\n"
 
 @pytest.fixture(scope="module")
 def studio() -> Iterator[Studio]:
-    with running(Studio(Playback(load_recording(FIRST_RECORDING)), port=0)) as found:
+    with running(Studio(Interlude(), port=0)) as found:
         yield found
 
 
@@ -255,7 +254,7 @@ def test_pages_are_counted(studio: Studio):
 
 
 def test_strangers_write_few_lines(caplog: pytest.LogCaptureFixture, capfd):
-    stage = Playback(load_recording(FIRST_RECORDING))
+    stage = Interlude()
     with caplog.at_level(logging.WARNING), running(Studio(stage, port=0)) as studio:
         for k in range(MOST_LINES + 20):
             if k % 2:
@@ -361,7 +360,7 @@ def elsewhere() -> Iterator[tuple[str, dict[str, bytes]]]:
 def test_a_hostile_page_in_the_same_browser_can_do_nothing(elsewhere):
     browser.need_chromium()
     address, pages = elsewhere
-    stage = Playback(load_recording(FIRST_RECORDING))
+    stage = Interlude()
     with running(Studio(stage, port=0)) as studio:
         for host in ("127.0.0.1", "localhost"):
             own = studio.url.replace("127.0.0.1", host)

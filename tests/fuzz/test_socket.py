@@ -15,9 +15,7 @@ import numpy as np
 import pytest
 from viser import _messages
 
-from kumite.scene import Playback
-from kumite.scene.recording import load_recording
-from kumite.studio import FIRST_RECORDING, Studio
+from kumite.studio import Interlude, Studio
 from kumite.studio.panel import FASTEST, SLOWEST
 from tests.stranger import CAMERA, CLICK, DRAG, GIZMO, join, plays_and_is_steered, running, say
 
@@ -100,7 +98,7 @@ def nearly(random: Random, studio: Studio) -> Any:
 
 @pytest.fixture
 def studio() -> Iterator[Studio]:
-    with running(Studio(Playback(load_recording(FIRST_RECORDING)), port=0)) as found:
+    with running(Studio(Interlude(), port=0)) as found:
         yield found
 
 

@@ -1,5 +1,6 @@
 """The studio: any stage, live or recorded, in the browser."""
 
-from kumite.studio.studio import FIRST_RECORDING, Studio, serve
+from kumite.studio.coming import Coming, Interlude
+from kumite.studio.studio import Studio, serve
 
-__all__ = ["FIRST_RECORDING", "Studio", "serve"]
+__all__ = ["Coming", "Interlude", "Studio", "serve"]

@@ -19,6 +19,7 @@ import viser
 from kumite.body import RGB, ROLES, BodyMesh, Palette, body_mesh, mix, palettes
 from kumite.body.spheres import SWORD
 from kumite.clip import Skeleton
+from kumite.rotation import multiply, rotate
 from kumite.scene.stage import OUT_OF_SIGHT
 from kumite.studio.ring import STAGE
 
@@ -80,6 +81,20 @@ def faces_by_colour(mesh: BodyMesh, colours: Palette) -> list[tuple[str, np.ndar
         if np.any(role == i):
             groups.setdefault(colours[name], []).append(i)
     return [(ROLES[g[0]], mesh.faces[np.isin(role, g)]) for g in groups.values()]
+
+
+def pose_uncompiled(
+    skeleton: Skeleton, root_position: np.ndarray, wxyz: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """As :func:`kumite.clip.forward_kinematics`, slower, with nothing to compile: a recording is
+    seen at once."""
+    position, world = np.empty((*wxyz.shape[:2], 3)), np.array(wxyz, dtype=np.float64)
+    position[:, 0] = root_position
+    for j in range(1, len(skeleton)):
+        p = skeleton.parents[j]
+        position[:, j] = position[:, p] + rotate(world[:, p], skeleton.offsets[j])
+        world[:, j] = multiply(world[:, p], wxyz[:, j])
+    return position, world
 
 
 class _Flashes:

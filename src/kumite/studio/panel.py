@@ -10,6 +10,7 @@ import viser
 from kumite.scene.actions import ActionPlayback
 from kumite.scene.bout import BoutScene
 from kumite.studio.action_list import ActionList
+from kumite.studio.coming import Banner, Coming
 from kumite.studio.direction import Direction, Director
 from kumite.studio.dodging import Dodging, Thrower
 from kumite.studio.doors import LARGEST_SEED, safely, within
@@ -22,6 +23,7 @@ from kumite.studio.walking import Walking
 from kumite.studio.wording import EventLog, lines_html, score_html
 
 SLOWEST, FASTEST = 0.1, 4.0
+TIME_STEP = 0.01  # s
 WIDTH = 330.0  # px
 
 
@@ -99,6 +101,7 @@ class Panel:
         volumes: Volumes | None = None,
         leader: Leader | None = None,
         prepared: Prepared | None = None,
+        coming: Coming | None = None,
     ) -> None:
         self._fps = fps
         self._shown: dict[str, Any] = {}
@@ -114,6 +117,7 @@ class Panel:
         gui.main_panel.dock_right()
         gui.main_panel.set_width(WIDTH)
 
+        self._banner = None if coming is None else Banner(gui, coming, title)
         self._play = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE, hint="space")
         self._play.on_click(safely(lambda _: desk.toggle()))
         more = gui.add_button_group("", ("Step", "Restart"), hint="N: one frame on · R: restart")
@@ -130,7 +134,7 @@ class Panel:
             number.on_update(safely(lambda e: desk.restart(int(e.target.value))))
         else:
             last = _last(frames, fps)
-            self._timeline = gui.add_slider("Time", 0.0, last, step=1 / fps, initial_value=0.0)
+            self._timeline = gui.add_slider("Time", 0.0, last, step=TIME_STEP, initial_value=0.0)
             self._timeline.on_update(safely(lambda e: _seek(desk, e, fps)))
         follow = gui.add_checkbox("Follow", True, hint="keep the fighters in the middle")
         follow.on_update(safely(lambda e: desk.set_follow(e.target.value)))
@@ -165,6 +169,10 @@ class Panel:
                 decisions.on_update(safely(lambda e: desk.show_decisions(e.target.value)))
         _add_keys(gui, _runs(desk))
 
+    def look_out(self) -> bool:
+        """Say how far what is coming is; whether that has changed."""
+        return self._banner is not None and self._banner.show()
+
     def set_length(self, frames: int) -> None:
         """Another recording is played, from its start."""
         if self._timeline is not None:
@@ -183,7 +191,7 @@ class Panel:
         """Bring time, score and events up to date; what has not changed is not sent."""
         if self._timeline is not None and self._shown.get("frame") != frame:
             self._shown["frame"] = frame
-            self._timeline.value = frame / self._fps
+            self._timeline.value = min(round(frame / self._fps, 2), self._timeline.max)
         clock = (
             '<div style="padding:0 1em .5em;font-size:.85em;opacity:.75">'
             f"{frame / self._fps:.1f} s{note}</div>"
@@ -206,7 +214,7 @@ class Panel:
 
 def _last(frames: int, fps: float) -> float:
     """The end [s] of a slider over frames: never its start."""
-    return max(frames - 1, 1) / fps
+    return max(round((frames - 1) / fps, 2), TIME_STEP)
 
 
 def _seek(desk: Desk, event: Any, fps: float) -> None:

@@ -14,7 +14,6 @@ import time
 import webbrowser
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -29,6 +28,7 @@ from kumite.scene.prepare import PrepareScene
 from kumite.scene.recording import Event
 from kumite.scene.stage import Playback, Stage, in_sight
 from kumite.studio import bodies, props, ring
+from kumite.studio.coming import Coming
 from kumite.studio.doors import a_place, a_seed, within
 from kumite.studio.leading import Leader
 from kumite.studio.pace import Pace
@@ -40,7 +40,6 @@ from kumite.studio.throwing import Throws
 from kumite.studio.volumes import VolumePicture, Volumes
 from kumite.studio.wording import LANDED, EventLog, is_dodging, is_preparing, place, struck
 
-FIRST_RECORDING = FilePath(__file__).with_name("sparring.rec")  # shown while a scene is prepared
 MOST_DRAWN = 60.0  # pictures a second
 PANEL_PERIOD = 0.2  # s between updates of what is read, not watched
 IDLE_PERIOD = 0.25  # s between looks at a paused stage
@@ -67,6 +66,7 @@ class Studio:
     """A stage in the browser. Make it, :meth:`run` it, :meth:`close` it.
 
     allowed: names besides ``host`` that the page may be asked for as (of a proxy or a tunnel).
+    coming: what is prepared meanwhile, and shown in place of ``stage`` as soon as it is ready.
     Errors: no body can be laid on the skeleton; a host that is not this machine's; with
     ``strict_port`` a port that is taken (without, the next free one is used).
     """
@@ -79,30 +79,53 @@ class Studio:
         port: int | None = 8080,
         strict_port: bool = False,
         allowed: Sequence[str] = (),
+        coming: Coming | None = None,
     ) -> None:
-        self.stage = stage
         self._lock = threading.RLock()
         self._stop = threading.Event()
         self._wake = threading.Event()
+        self._coming = coming
+        self._take(stage)
+        mesh = body_mesh(stage.skeleton)
+        self.server = open_server(host, port, stage.title, strict=strict_port, allowed=allowed)
+        self.url = url_of(host, self.server.get_port())
+        try:
+            self._build(mesh)
+            self.server.on_client_connect(lambda _: self.wake())
+        except BaseException:
+            self.close()
+            raise
+
+    def _take(self, stage: Stage) -> None:
+        """Everything about a stage that is not shown yet."""
+        self.stage = stage
         self._redraw = self._rewound = True
         self._playing = True
         self._ended = False
         self._hits: list[Event] = []
         self._pace = Pace(stage.fps)
         self._log = EventLog(stage.names, dodging=is_dodging(stage), preparing=is_preparing(stage))
-        mesh = body_mesh(stage.skeleton)
-        self.server = open_server(host, port, stage.title, strict=strict_port, allowed=allowed)
-        self.url = url_of(host, self.server.get_port())
-        try:
+
+    def show(self, stage: Stage) -> None:
+        """Show another stage in the same page, from now on. The thread that runs.
+
+        Errors: no body can be laid on its skeleton; what is shown then stays.
+        """
+        mesh, server = body_mesh(stage.skeleton), self.server
+        with self._lock, server.atomic():
+            server.scene.remove_click_callback("all")
+            server.scene.reset()
+            server.gui.reset()
+            self._take(stage)
             self._build(mesh)
-        except BaseException:
-            self.close()
-            raise
+        server.flush()
 
     def _build(self, mesh: bodies.BodyMesh) -> None:
         stage, server = self.stage, self.server
         self._follow = ring.Follow(ring.build(server))
         unarmed = getattr(stage, "unarmed", ())
+        recorded = stage if isinstance(stage, Playback) else None
+        self._pose = forward_kinematics if recorded is None else bodies.pose_uncompiled
         self._bodies = bodies.show_bodies(server, stage.skeleton, mesh, stage.names, unarmed)
         self._walk = stage if isinstance(stage, PrepareScene) else None
         dragged = None if self._walk is None else self._drag_object
@@ -121,7 +144,7 @@ class Studio:
             self,
             title=stage.title,
             seed=stage.seed,
-            frames=len(stage.recording) if isinstance(stage, Playback) else None,
+            frames=None if recorded is None else len(recorded.recording),
             fps=stage.fps,
             controls=[c for c in getattr(stage, "controls", ()) if isinstance(c, Control)],
             actions=stage if isinstance(stage, ActionPlayback) else None,
@@ -131,6 +154,7 @@ class Studio:
             volumes=self._volumes,
             leader=None if self._walk is None else Leader(self._walk),
             prepared=self._prepared,
+            coming=self._coming,
         )
         picture = self._look()
         self._follow.jump(self._midpoint(picture))
@@ -145,7 +169,6 @@ class Studio:
         self._drawn_at = self._panel_at = time.perf_counter()
         with server.atomic():
             self._draw(picture, 0.0)
-        server.on_client_connect(lambda _: self.wake())
 
     # What the page asks for; any thread.
 
@@ -286,10 +309,16 @@ class Studio:
         return np.asarray(point, dtype=np.float64) + np.array([x, 0.0, z])
 
     def run(self, seconds: float | None = None) -> None:
-        """Play until :meth:`stop`, or for ``seconds`` of wall time."""
-        end = None if seconds is None else time.perf_counter() + seconds
+        """Play until :meth:`stop`, or for ``seconds`` of wall time; they count from when what is
+        coming has come. Errors: those of its preparation.
+        """
+        end = None
         self._pace.restart()
         while not self._stop.is_set():
+            if self._coming is not None:
+                self._look_out_for(self._coming)
+            elif end is None and seconds is not None:
+                end = time.perf_counter() + seconds
             moving = self._tick()
             pause = self._pace.wait() if self._playing else IDLE_PERIOD
             pause = min(pause, 1 / 30) if moving else pause
@@ -300,6 +329,16 @@ class Studio:
                 pause = min(pause, left)
             self._wake.wait(pause)
             self._wake.clear()
+
+    def _look_out_for(self, coming: Coming) -> None:
+        """Show what is coming when it has come, and till then how far it is."""
+        if coming.error is not None:
+            raise coming.error
+        if coming.stage is None:
+            self._redraw |= self._panel.look_out()
+            return
+        self._coming = None
+        self.show(coming.stage)
 
     def _step(self, frames: int) -> None:
         for _ in range(frames):
@@ -366,9 +405,7 @@ class Studio:
         ] + sketched(self._sketch)
 
     def _draw(self, picture: _Picture, seconds: float) -> None:
-        position, world = forward_kinematics(
-            self.stage.skeleton, picture.root_position, picture.wxyz
-        )
+        position, world = self._pose(self.stage.skeleton, picture.root_position, picture.wxyz)
         for hit in picture.hits:
             self._show_hit(hit, position)
         if not (self._targets.held or self._paths.held or self._sketch.who is not None):
@@ -431,15 +468,21 @@ def serve(
     strict_port: bool = False,
     allowed: Sequence[str] = (),
     announce: Callable[[str], None] = print,
+    coming: Coming | None = None,
 ) -> None:
     """Show a stage in the browser until Ctrl-C, or for ``seconds``.
+
+    coming: is prepared while ``stage`` is shown, then shown in its place; from then on ``seconds``
+    count.
 
     A taken port moves on to the next free one, and that is said; with ``strict_port`` it is an
     error. ``port`` 0 or None takes any. Errors: as :class:`Studio`.
     """
     if seconds is not None and not seconds > 0:
         raise KumiteError(f"{seconds} seconds of studio; expected more than 0")
-    studio = Studio(stage, host=host, port=port, strict_port=strict_port, allowed=allowed)
+    studio = Studio(
+        stage, host=host, port=port, strict_port=strict_port, allowed=allowed, coming=coming
+    )
     try:
         found = studio.server.get_port()
         if port and found != port:
@@ -447,12 +490,19 @@ def serve(
         if not is_loopback(host):
             announce(f"listening on {host}: others on the network can watch and interfere")
         announce(f"studio: {studio.url}  (Ctrl-C ends)")
+        if coming is not None:
+            announce(
+                f"a recorded fight is shown; live {coming.name} is being prepared, only this once"
+            )
+            coming.start()
         if open_browser:
             _open_page(studio.url)
         studio.run(seconds)
     except KeyboardInterrupt:
         announce("studio closed")
     finally:
+        if coming is not None:
+            coming.stop()
         studio.close()
 
 

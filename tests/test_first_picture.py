@@ -1,0 +1,146 @@
+"""What the studio shows first: a recorded fight, while the scene asked for is being prepared."""
+
+from __future__ import annotations
+
+import contextlib
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import psutil
+import pytest
+
+from kumite.clip import forward_kinematics, tip_positions
+from kumite.errors import KumiteError
+from kumite.graph import Library
+from kumite.scene import LiveScene, load_scene, measure
+from kumite.studio import Coming, Interlude, Studio
+from kumite.studio.bodies import pose_uncompiled
+from kumite.studio.coming import RECORDING
+from tests.stranger import CAMERA, control, join, plays_and_is_steered, running, say, setting, wait
+
+
+def test_the_recorded_fight_is_a_fight():
+    recording = Interlude().recording
+    assert RECORDING.stat().st_size <= 800_000
+    assert 15.0 <= recording.seconds <= 20.0 and recording.scene == "Sparring"
+    metrics = measure(recording)
+    assert all(c.landed >= 3 and (c.facing_share or 0.0) > 0.8 for c in metrics.characters)
+    assert all(c.join_jump_m_s < 0.3 for c in metrics.characters)
+    assert min(e.frame for e in recording.events if e.kind == "hit") < 3.0 * recording.fps
+    for k in range(2):
+        root, wxyz = recording.root_position[:, k], recording.wxyz[:, k]
+        position, world = forward_kinematics(recording.skeleton, root, wxyz)
+        feet = [
+            tip_positions(recording.skeleton, f"{side}_foot", position, world)[:, 1]
+            for side in ("left", "right")
+        ]
+        lowest = np.minimum(*feet)
+        assert lowest.min() > -0.03 and np.median(np.abs(lowest)) < 0.03
+        plain = pose_uncompiled(recording.skeleton, root.astype(float), wxyz.astype(float))
+        np.testing.assert_allclose(plain[0], position, atol=1e-9)
+        np.testing.assert_allclose(plain[1], world, atol=1e-9)
+
+
+def test_it_plays_over_and_over():
+    stage = Interlude()
+    stage.seek(len(stage.recording) - 1)
+    assert stage.step() and stage.frame == 0
+
+
+@contextlib.contextmanager
+def preparing(stage: LiveScene, go: threading.Event) -> Iterator[tuple[Studio, Coming]]:
+    """A studio that shows the recorded fight till ``go``."""
+
+    def make(coming: Coming) -> LiveScene:
+        coming.tell("compiling 34 of 133", 0.25)
+        go.wait(60)
+        return stage
+
+    coming = Coming(stage.title, make)
+    studio = Studio(Interlude(), port=0, coming=coming)
+    coming.start()
+    with running(studio):
+        yield studio, coming
+
+
+def test_the_live_scene_follows_in_the_same_page(library: Library):
+    stage, go = LiveScene(load_scene("target"), library, seed=3), threading.Event()
+    with preparing(stage, go) as (studio, _), join(studio) as page:
+        say(page, CAMERA)
+        plays_and_is_steered(studio)
+        assert wait(lambda: "34 of 133" in studio._panel._banner._text.content)  # type: ignore
+        old = setting(studio, "Speed", 2.0)
+        go.set()
+        assert wait(lambda: studio.stage is stage and stage.frame > 0)
+        assert control(studio, "Seed").value == 3
+        labels = {h.label for h in studio.server.gui._gui_input_handle_from_uuid.values()}
+        assert "Time" not in labels and stage.controls[0].name in labels
+        say(page, old)  # of a control that was there a moment ago
+        say(page, setting(studio, "Speed", 3.0))
+        assert wait(lambda: studio._pace.speed == 3.0)
+        plays_and_is_steered(studio)
+
+
+def test_time_counts_from_the_live_scene_on(library: Library):
+    stage, go = LiveScene(load_scene("target"), library, seed=3), threading.Event()
+    coming = Coming(stage.title, lambda coming: (go.wait(60), stage)[1])
+    studio = Studio(Interlude(), port=0, coming=coming)
+    coming.start()
+    thread = threading.Thread(target=studio.run, args=(0.5,), daemon=True)
+    thread.start()
+    time.sleep(1.0)
+    assert thread.is_alive()
+    go.set()
+    thread.join(30)
+    studio.close()
+    assert not thread.is_alive() and studio.stage is stage and stage.frame > 0
+
+
+def test_what_cannot_be_prepared_ends_the_studio_with_its_reason():
+    def make(coming: Coming) -> LiveScene:
+        raise KumiteError("no such library")
+
+    coming = Coming("Target", make)
+    studio = Studio(Interlude(), port=0, coming=coming)
+    coming.start()
+    with pytest.raises(KumiteError, match="no such library"):
+        studio.run(30.0)
+    studio.close()
+
+
+def test_it_says_how_much_time_is_left():
+    coming = Coming("Target", lambda coming: Interlude())
+    coming.tell("compiling 2 of 8", 0.25)
+    assert coming.line() == "compiling 2 of 8"  # too soon to tell
+    coming._begun -= 10.0
+    assert coming.line() == "compiling 2 of 8, some 30 s left"
+
+
+def test_nothing_that_works_for_it_is_left_behind():
+    started = threading.Event()
+    code = "import subprocess, sys; subprocess.run([sys.executable, '-c', 'input()'])"
+    found: list[subprocess.Popen[bytes]] = []
+
+    def make(coming: Coming) -> Interlude:
+        process = subprocess.Popen(
+            [sys.executable, "-c", code], stdin=subprocess.PIPE, start_new_session=True
+        )
+        found.append(process)
+        coming.own(process)
+        started.set()
+        process.wait()
+        return Interlude()
+
+    coming = Coming("Target", make)
+    coming.start()
+    assert started.wait(10)
+    parent = psutil.Process(found[0].pid)
+    assert wait(lambda: len(parent.children()) == 1)
+    (child,) = parent.children()
+    coming.stop()
+    assert wait(lambda: not child.is_running() or child.status() == psutil.STATUS_ZOMBIE)
+    assert found[0].poll() is not None
