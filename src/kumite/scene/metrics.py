@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -11,6 +11,7 @@ from kumite.clip import SIDES, Skeleton, facing_frame, forward_kinematics
 from kumite.graph import Library
 from kumite.rotation import wrap_angle
 from kumite.scene.recording import NO_FRAME, Event, Recording
+from kumite.scene.reports import Report, reports
 
 FACING_WITHIN = np.radians(45.0)
 
@@ -34,9 +35,11 @@ class Metrics:
     seconds: float
     min_separation_m: float | None  # smallest distance between two pelvises over the ground
     characters: tuple[CharacterMetrics, ...]
+    reports: tuple[Report, ...] = ()  # what the recording is about
 
     def to_json(self) -> dict:
-        return asdict(self)
+        reports = {r.name: {label: dict(row) for label, row in r.rows.items()} for r in self.reports}
+        return {**asdict(replace(self, reports=())), "reports": reports}
 
 
 def foot_skate(
@@ -133,4 +136,5 @@ def measure(recording: Recording) -> Metrics:
                 len(set(taken)) / len(taken) if taken else 0.0,
             )
         )
-    return Metrics(recording.seconds, float(min(gaps)) if gaps else None, tuple(rows))
+    nearest = float(min(gaps)) if gaps else None
+    return Metrics(recording.seconds, nearest, tuple(rows), reports(recording))
