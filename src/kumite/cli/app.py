@@ -1,21 +1,72 @@
-"""What all commands share: the application, its two consoles, progress and options."""
+"""What all commands share: the application, its two consoles and options."""
 
 from __future__ import annotations
 
+import functools
+import inspect
 import json
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-app = typer.Typer(
+INTERRUPTED = 130  # the status of a process that Ctrl-C has ended
+
+
+class App(typer.Typer):
+    """An application whose every command has --quiet, and ends with one line on Ctrl-C."""
+
+    def command(self, *args: Any, **options: Any) -> Callable[[Callable], Callable]:
+        register = super().command(*args, **options)
+
+        def add(function: Callable) -> Callable:
+            register(_shared(function))
+            return function
+
+        return add
+
+
+def _shared(function: Callable) -> Callable:
+    """A command with what all commands have."""
+    own = inspect.signature(function, eval_str=True).parameters
+    quiet = inspect.Parameter(
+        "quiet", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=QuietOption
+    )
+
+    @functools.wraps(function)
+    def run(*args: Any, quiet: bool, **given: Any) -> None:
+        settings.quiet = settings.quiet or quiet
+        try:
+            function(*args, **given)
+        except KeyboardInterrupt:
+            err.print("interrupted", highlight=False)
+            raise typer.Exit(INTERRUPTED) from None
+
+    shown = [*own.values(), quiet]
+    run.__annotations__ = {p.name: p.annotation for p in shown}
+    run.__signature__ = inspect.Signature(shown)  # pyright: ignore[reportAttributeAccessIssue]
+    del run.__wrapped__
+    return run
+
+
+class _Settings:
+    quiet = False
+
+
+QuietOption = Annotated[
+    bool,
+    typer.Option("--quiet", "-q", help="No progress: only results, warnings and errors."),
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for scripts.")]
+
+settings = _Settings()
+app = App(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # Rich would take "[m/s]" in a help text for markup
     help="Motion capture of one person at a time, turned into characters that spar.",
     epilog="Start with: kumite studio sparring (the built-in performer, no download).",
 )
@@ -24,69 +75,18 @@ _WIDTH = None if (sys.stdout and sys.stdout.isatty()) or "COLUMNS" in os.environ
 out = Console(soft_wrap=True, width=_WIDTH)
 err = Console(stderr=True, soft_wrap=True)
 
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for scripts.")]
-
 
 @app.callback(invoke_without_command=True)
 def _root(
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    quiet: QuietOption = False,
 ) -> None:
+    settings.quiet = quiet
     if version:
         from kumite import __version__
 
         print(f"kumite {__version__}")
         raise typer.Exit
-
-
-@contextmanager
-def progress() -> Iterator[Progress]:
-    """Bars on stderr, gone when done; a line a stage where stderr is no terminal."""
-    columns = (
-        SpinnerColumn(),
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.fields[note]}"),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as bars:
-        yield bars
-
-
-def log_line(line: str) -> None:
-    """A line instead of a bar, where stderr is a file."""
-    if not err.is_terminal:
-        err.print(line, markup=False, highlight=False)
-
-
-class Stages:
-    """Named stages on one spinner."""
-
-    def __init__(self, bars: Progress) -> None:
-        self._bars = bars
-        self._task = bars.add_task("starting", total=None, note="")
-
-    def __call__(self, stage: str) -> None:
-        self._bars.update(self._task, description=stage)
-        log_line(stage)
-
-
-class Training:
-    """A bar a policy: how far the residual has come, in powers of ten."""
-
-    def __init__(self, bars: Progress) -> None:
-        self._bars = bars
-        self._tasks: dict[str, Any] = {}
-
-    def __call__(self, name: str, sweep: int, residual: float) -> None:
-        from math import log10
-
-        if name not in self._tasks:
-            self._tasks[name] = self._bars.add_task(f"training: {name}", total=4.0, note="")
-            log_line(f"training: {name}")
-        done = min(4.0, max(0.0, -log10(max(residual, 1e-4))))
-        self._bars.update(
-            self._tasks[name], completed=done, note=f"sweep {sweep}, residual {residual:.1e}"
-        )
 
 
 def print_json(value: Any) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
-from kumite.cli.app import JsonOption, Stages, app, err, out, print_json, progress
+from kumite.cli.app import JsonOption, app, err, out, print_json
 from kumite.cli.library import (
     is_library,
     library_lines,
@@ -16,6 +16,7 @@ from kumite.cli.library import (
     show_library,
     worth_table,
 )
+from kumite.cli.progress import Bars, Stages, progress
 from kumite.cli.reading import FpsOption, Reading, SkipBad, Source, reads_mocap
 from kumite.errors import KumiteError, unknown
 
@@ -350,7 +351,7 @@ def perform(
         stage(f"performing {style}")
         made = perform_style(style, seed, mirrored=mirrored)
         if output is not None:
-            _write_performance(output, made, stage)
+            _write_performance(output, made, bars)
     rows = [
         {
             "clip": clip.name,
@@ -376,7 +377,7 @@ def perform(
         out.print(f"wrote {len(rows)} clips to {output}", markup=False, highlight=False)
 
 
-def _write_performance(folder: Path, made: Any, stage: Stages) -> None:
+def _write_performance(folder: Path, made: Any, bars: Bars) -> None:
     import json
 
     from kumite.export.bvh import write_bvh
@@ -387,8 +388,9 @@ def _write_performance(folder: Path, made: Any, stage: Stages) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise KumiteError(f"{folder}: cannot be made ({error.strerror})") from None
-    for clip, truth in zip(made.clips, made.truth):
-        stage(f"writing {clip.name}")
+    bar = bars.add("writing clips", total=len(made.clips))
+    for n, (clip, truth) in enumerate(zip(made.clips, made.truth)):
+        bars.update(bar, n, note=clip.name)
         write_bvh(folder / f"{clip.name}.bvh", clip)
         with writing(folder / f"{clip.name}.truth.json") as temporary:
             text = json.dumps(truth_to_json(truth), indent=1)

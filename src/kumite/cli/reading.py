@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from kumite.cli.app import Stages, err, progress
+from kumite.cli.app import err
+from kumite.cli.progress import Stages, progress
 from kumite.errors import KumiteError
 
 if TYPE_CHECKING:

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+import signal
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.table import Table
 
-from kumite.cli.app import JsonOption, Stages, Training, app, out, print_json, progress
+from kumite.cli.app import INTERRUPTED, JsonOption, app, err, out, print_json
+from kumite.cli.complete import complete_scene, complete_shown
 from kumite.cli.library import is_library
+from kumite.cli.progress import Stages, Training, progress, say
+from kumite.cli.report import show_metrics
 from kumite.errors import KumiteError, unknown
 from kumite.scene import catalogue
 
@@ -28,11 +34,24 @@ def scenes(as_json: JsonOption = False) -> None:
     """The built-in scenes."""
     if as_json:
         from kumite.scene import builtin_scenes
+        from kumite.scene.needs import needs
 
-        print_json({name: s.model_dump(mode="json") for name, s in builtin_scenes().items()})
+        print_json(
+            {
+                name: {
+                    "title": s.title,
+                    "shows": s.about,
+                    "characters": len(s.names),
+                    "needs": needs(s).to_json(),
+                    "settings": s.model_dump(mode="json", exclude_unset=True),
+                }
+                for name, s in builtin_scenes().items()
+            }
+        )
         return
+    width = max(map(len, catalogue.names()))
     for name in catalogue.names():
-        out.print(f"{name:12} {catalogue.about(name)}", markup=False, highlight=False)
+        out.print(f"{name:{width}} {catalogue.about(name)}", markup=False, highlight=False)
 
 
 CountOption = Annotated[
@@ -60,30 +79,23 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
     from kumite.control import cache_folder
     from kumite.graph import builtin_library, load_library
     from kumite.scene import BoutScene, DodgeScene, EvasionScene, LiveScene, PrepareScene
-    from kumite.scene.dodge import DodgeSettings
-    from kumite.scene.errands import PrepareSettings
-    from kumite.scene.fighters import BoutSettings
+    from kumite.scene.needs import needs
 
-    cache = cache_folder(library)
+    cache, needed = cache_folder(library), needs(settings)
     with progress() as bars:
         stages = Stages(bars)
         if library is not None:
             stages("reading the library")
             found = load_library(library)
         else:
-            bout = settings.bout or BoutSettings()
-            style, level = bout.library, "actions" if settings.fighters else "frames"
-            if settings.dodging:
-                style, level = (settings.dodge or DodgeSettings()).library, "avoidance"
-            if settings.walking:
-                style, level = (settings.prepare or PrepareSettings()).library, "preparation"
-            found = builtin_library(cache, progress=stages, style=style, level=level)
-        if settings.attacker:
-            style = settings.attacker[0].library
-            if is_library(style):
-                attack = load_library(style)
+            found = builtin_library(cache, progress=stages, style=needed.style, level=needed.level)
+        if needed.attackers is not None:
+            if is_library(needed.attackers):
+                attack = load_library(needed.attackers)
             else:
-                attack = builtin_library(cache_folder(None), progress=stages, style=style)
+                attack = builtin_library(
+                    cache_folder(None), progress=stages, style=needed.attackers
+                )
             stages("preparing the scene")
             training = Training(bars)
             return EvasionScene(settings, found, attack, seed=seed, cache=cache, progress=training)
@@ -91,8 +103,7 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
         if settings.walking:
 
             def learning(batch: int, changed: float) -> None:
-                if batch % 20 == 1:
-                    stages(f"learning to approach: batch {batch}, {changed:.1%} of states changed")
+                stages(f"learning to approach: batch {batch}, {changed:.1%} of states changed")
 
             return PrepareScene(settings, found, seed=seed, cache=cache, progress=learning)
         if settings.dodging:
@@ -104,9 +115,20 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
 
 @app.command()
 def run(
-    scene: Annotated[str, typer.Argument(help="A built-in scene or a .toml scene file.")],
+    scene: Annotated[
+        str,
+        typer.Argument(
+            help="A built-in scene or a .toml scene file.", autocompletion=complete_scene
+        ),
+    ],
     library: LibraryOption = None,
-    seconds: Annotated[float, typer.Option(help="How long [s].")] = 30.0,
+    seconds: Annotated[
+        float | None,
+        typer.Option(
+            help="How long [s] (default 30; with --throws until all balls are down). Balls come "
+            "faster where they would not all be thrown in that time."
+        ),
+    ] = None,
     count: CountOption = None,
     throws: ThrowsOption = None,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same bytes.")] = 0,
@@ -116,113 +138,84 @@ def run(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Run a scene without drawing, record it, and print how good it is."""
+    """Run a scene without drawing, record it, and print how good it is.
+
+    Ctrl-C ends it early and keeps what ran: all that was asked for is written. A second Ctrl-C
+    ends at once and writes nothing.
+    """
     for path in output or []:  # before any long work: what is wrong is said at once
         _exporter(path)
     settings = _settings(scene, count, throws)
-    from kumite.scene import measure, record
+    from kumite.scene import measure, record, seconds_to_throw, throws_within
 
+    if seconds is None:
+        seconds = SECONDS if throws is None else max(SECONDS, seconds_to_throw(settings))
+    elif throws is not None:
+        asked_for, settings = settings, throws_within(settings, seconds)
+        if settings.balls is not None and settings is not asked_for:
+            every = settings.balls.every
+            say(f"a ball every {every:.2f} s, so that all {throws} are thrown in {seconds:g} s")
     everyone = (
         settings.model_copy(update={"crowd": None}).names if settings.crowd else settings.names
     )
     _check_outputs(output or [], [*everyone, *(["the crowd"] if settings.crowd else [])])
     live = _live_scene(settings, library, seed)
-    with progress() as bars:
-        task = bars.add_task(f"running {scene}", total=1.0, note="")
-        recording = record(live, seconds, lambda share: bars.update(task, completed=share))
+    with progress() as bars, _asked_to_stop() as asked:
+        bar = bars.add(f"running {scene}", total=1.0)
+        recording = record(live, seconds, lambda share: bars.update(bar, share), asked.is_set)
+    if asked.is_set():
+        err.print(f"interrupted after {recording.seconds:.1f} of {seconds:g} s", highlight=False)
     for path in output or []:
+        say(f"writing {path}")
         _export(recording, path)
-    _show_metrics(measure(recording), as_json)
+    show_metrics(measure(recording), as_json)
     if not as_json:
-        for line in (*_thinking(live), *_avoiding(recording)):
+        for line in (*_thinking(live), *(f"wrote {path}" for path in output or [])):
             out.print(line, markup=False, highlight=False)
-        for path in output or []:
-            out.print(f"wrote {path}", markup=False, highlight=False)
+    if asked.is_set():
+        raise typer.Exit(INTERRUPTED)
+
+
+@contextmanager
+def _asked_to_stop() -> Iterator[threading.Event]:
+    """Whether Ctrl-C was pressed: the first time it only asks, the second time it interrupts."""
+    asked = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield asked
+        return
+    before = signal.getsignal(signal.SIGINT)
+
+    def ask(number: int, frame: Any) -> None:
+        asked.set()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    signal.signal(signal.SIGINT, ask)
+    try:
+        yield asked
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _thinking(live: Any) -> list[str]:
     """How long decisions took. Not in the recording: the same seed gives the same bytes."""
-    decisions = getattr(live, "decisions", [])
-    if not decisions:
+    seconds = sorted(d.seconds for d in getattr(live, "decisions", []))
+    if not seconds:
         return []
-    seconds = sorted(d.seconds for d in decisions)
-    nodes = sum(int(d.nodes.sum()) for d in decisions)
-    pruned = sum(d.pruned for d in decisions) / len(decisions)
-    return [
-        f"{len(decisions)} decisions, {nodes} nodes, {pruned:.0%} pruned; "
-        f"{1e3 * sum(seconds) / len(seconds):.1f} ms a decision, at most {1e3 * seconds[-1]:.1f} ms"
-    ]
-
-
-def _avoiding(recording: Any) -> list[str]:
-    """What came of what was thrown at those who avoid."""
-    kinds = [e.kind for e in recording.events]
-    found = [e.data["outcome"] for e in recording.events if e.kind == "avoidance"]
-    if not found and "throw" not in kinds:
-        return []
-    outcomes = ", ".join(f"{name} {found.count(name)}" for name in sorted(set(found)))
-    return [
-        f"{kinds.count('throw')} balls thrown; {kinds.count('avoided')} attacks avoided, "
-        f"{kinds.count('missed')} missed anyway, "
-        f"{kinds.count('struck')} balls struck somebody; searches: {outcomes or 'none'}"
-    ]
-
-
-def _show_metrics(metrics: Any, as_json: bool) -> None:
-    if as_json:
-        print_json(metrics.to_json())
-        return
-    table = Table(title=f"{metrics.seconds:.1f} s")
-    columns = ("", "thrown", "landed", "blocked", "skate m/s", "of source", "facing")
-    for column in (*columns, "join jump m/s", "joins", "variety"):
-        table.add_column(column, justify="right")
-    shown = metrics.characters if len(metrics.characters) <= MOST_SHOWN else ()
-    for c in shown:
-        ratio = "" if c.skate_ratio is None else f"{c.skate_ratio:.2f}"
-        facing = "" if c.facing_share is None else f"{c.facing_share:.0%}"
-        table.add_row(
-            c.name,
-            str(c.thrown),
-            str(c.landed),
-            str(c.blocked),
-            f"{c.skate_m_s:.3f}",
-            ratio,
-            facing,
-            f"{c.join_jump_m_s:.2f}",
-            str(c.joins),
-            f"{c.variety:.0%}",
-        )
-    if shown:
-        out.print(table)
-    else:
-        many = metrics.characters
-        out.print(
-            f"{metrics.seconds:.1f} s, {len(many)} characters: "
-            f"{sum(c.thrown for c in many)} blows thrown, {sum(c.landed for c in many)} landed, "
-            f"{sum(c.blocked for c in many)} blocked, "
-            f"{sum(c.landed > 0 for c in many)} of them landed one; worst skate "
-            f"{max(c.skate_m_s for c in many):.3f} m/s, worst jump at a join "
-            f"{max(c.join_jump_m_s for c in many):.2f} m/s"
-        )
-    if metrics.min_separation_m is not None:
-        out.print(f"smallest distance between bodies: {metrics.min_separation_m:.2f} m")
+    mean = sum(seconds) / len(seconds)
+    return [f"{1e3 * mean:.1f} ms a decision, at most {1e3 * seconds[-1]:.1f} ms"]
 
 
 @app.command()
 def metrics(
     recording: Annotated[Path, typer.Argument(help="A .rec file.")], as_json: JsonOption = False
 ) -> None:
-    """Score a recording: hits, foot skate, distances, facing, joins."""
+    """Figures of a recording: what it is about (blows, balls, errands, …), and how all move."""
     from kumite.scene import load_recording, measure
 
-    loaded = load_recording(recording)
-    _show_metrics(measure(loaded), as_json)
-    if not as_json:
-        for line in _avoiding(loaded):
-            out.print(line, markup=False, highlight=False)
+    show_metrics(measure(load_recording(recording)), as_json)
 
 
-MOST_SHOWN = 40  # characters, each in a row of its own
+SECONDS = 30.0  # of a run
 EXPORTS = (".rec", ".glb", ".bvh", ".png")
 
 
@@ -296,7 +289,8 @@ def studio(
     scene: Annotated[
         str,
         typer.Argument(
-            help="A built-in scene, a .toml scene file, a .rec file, or a library of actions."
+            help="A built-in scene, a .toml scene file, a .rec file, or a library of actions.",
+            autocompletion=complete_shown,
         ),
     ] = "sparring",
     library: LibraryOption = None,

@@ -9,7 +9,8 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from kumite.cli.app import JsonOption, Stages, app, out, print_json, progress
+from kumite.cli.app import JsonOption, app, out, print_json
+from kumite.cli.progress import Stages, progress
 from kumite.cli.reading import FpsOption, Reading, SkipBad, reads_mocap
 from kumite.errors import KumiteError
 

@@ -8,9 +8,8 @@ from typing import Annotated
 
 import typer
 
-from kumite.cli.app import JsonOption, Stages, app, err, log_line, out, print_json, progress
-
-INTERRUPTED = 130  # the status of a process that Ctrl-C has ended
+from kumite.cli.app import INTERRUPTED, JsonOption, app, err, out, print_json
+from kumite.cli.progress import Stages, progress
 
 
 @app.command()
@@ -134,7 +133,7 @@ def train(
     for line in lines:
         out.print(line, markup=False, highlight=False)
     if not policy.converged:
-        log_line("warning: more batches settle it (--most-batches)")
+        err.print("warning: more batches settle it (--most-batches)", highlight=False)
 
 
 def _some(batches: int) -> list[int]:

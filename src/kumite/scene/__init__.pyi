@@ -7,7 +7,15 @@ from kumite.scene.metrics import CharacterMetrics, Metrics, measure
 from kumite.scene.prepare import PrepareScene
 from kumite.scene.recording import Event, Recording, load_recording, save_recording
 from kumite.scene.run import record
-from kumite.scene.settings import SceneSettings, builtin_scenes, load_scene, with_count, with_throws
+from kumite.scene.settings import (
+    SceneSettings,
+    builtin_scenes,
+    load_scene,
+    seconds_to_throw,
+    throws_within,
+    with_count,
+    with_throws,
+)
 from kumite.scene.stage import Playback, SceneObject, Stage
 
 __all__ = [
@@ -32,6 +40,8 @@ __all__ = [
     "measure",
     "record",
     "save_recording",
+    "seconds_to_throw",
+    "throws_within",
     "with_count",
     "with_throws",
 ]

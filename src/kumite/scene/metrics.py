@@ -38,8 +38,8 @@ class Metrics:
     reports: tuple[Report, ...] = ()  # what the recording is about
 
     def to_json(self) -> dict:
-        reports = {r.name: {label: dict(row) for label, row in r.rows.items()} for r in self.reports}
-        return {**asdict(replace(self, reports=())), "reports": reports}
+        told = {r.name: {label: dict(row) for label, row in r.rows.items()} for r in self.reports}
+        return {**asdict(replace(self, reports=())), "reports": told}
 
 
 def foot_skate(

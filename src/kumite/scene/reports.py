@@ -114,9 +114,7 @@ def _found(events: Events) -> set[tuple[int, str]]:
     return {(e.data["attack"], e.character) for e in _where(events["avoidance"], outcome=FOUND)}
 
 
-def _end_of_throw(
-    attack: int, end: Event | None, ways_out: set[tuple[int, str]], name: str
-) -> str:
+def _end_of_throw(attack: int, end: Event | None, ways_out: set[tuple[int, str]], name: str) -> str:
     if end is None:
         return "in flight"
     if end.kind == "struck":

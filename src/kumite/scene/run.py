@@ -23,8 +23,11 @@ def record(
     scene: LiveScene | BoutScene | DodgeScene | EvasionScene | PrepareScene,
     seconds: float,
     progress: Callable[[float], None] = lambda share: None,
+    stop: Callable[[], bool] = lambda: False,
 ) -> Recording:
     """Step a scene for a time [s] and keep every frame and event. progress is told 0..1.
+
+    stop: asked before every frame but the first; where it says so the recording ends early.
 
     A scene that has run before goes on from where it is; its earlier events are left out, and times
     count from the recording's first frame.
@@ -48,6 +51,9 @@ def record(
     begin, seen = scene.frame, len(scene.events)
     for f in range(frames):
         if f:
+            if stop():
+                frames = f
+                break
             scene.step()
         root[f] = scene.root_position
         wxyz[f] = scene.wxyz
@@ -56,7 +62,7 @@ def record(
         rate[f] = scene.cast.pace
         for o, thing in enumerate(scene.objects):
             things[f, o] = thing.position
-        if f % 256 == 0:
+        if f % 16 == 0:
             progress(f / frames)
     progress(1.0)
     return Recording(
@@ -64,13 +70,13 @@ def record(
         fps=scene.fps,
         skeleton=scene.skeleton,
         names=scene.names,
-        root_position=root,
-        wxyz=wxyz,
-        contacts=contacts,
-        library_frame=shown,
+        root_position=root[:frames],
+        wxyz=wxyz[:frames],
+        contacts=contacts[:frames],
+        library_frame=shown[:frames],
         objects=tuple(thing.name for thing in scene.objects),
-        object_position=things,
-        rate=None if np.all(rate == 1.0) else rate,
+        object_position=things[:frames],
+        rate=None if np.all(rate[:frames] == 1.0) else rate[:frames],
         events=tuple(_counted_from(begin, e, scene.fps) for e in scene.events[seen:]),
         settings={
             "seed": scene.seed,

@@ -37,6 +37,8 @@ from kumite.scene.formation import MOST_PAIRS, PairsSettings
 from kumite.scene.story import CueSettings, VehicleSettings
 
 Weight = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+DOWN = 2.0  # s after which a ball that was thrown has come down
+SOONEST = 0.02  # s between two throws
 CROWD_SPACING = 1.5  # m between the two of a pair; pairs stand twice as far apart
 
 
@@ -365,6 +367,31 @@ def with_throws(settings: SceneSettings, throws: int) -> SceneSettings:
     if not 0 <= throws <= 100_000:
         raise KumiteError(f"throws: {throws}, expected from 0 to 100000")
     balls = (settings.balls or BallsSettings()).model_copy(update={"throws": throws})
+    return SceneSettings.model_construct(**{**dict(settings), "balls": balls})
+
+
+def seconds_to_throw(settings: SceneSettings) -> float:
+    """How long [s] it takes until all balls that the seed throws are thrown and down."""
+    balls = settings.balls or BallsSettings()
+    return balls.first + max(balls.throws - 1, 0) * balls.every + DOWN
+
+
+def throws_within(settings: SceneSettings, seconds: float) -> SceneSettings:
+    """The scene with balls thrown so much faster that all are thrown and down in a time [s].
+
+    Errors: more balls than find time.
+    """
+    if seconds_to_throw(settings) <= seconds:
+        return settings
+    balls = settings.balls or BallsSettings()
+    every = (seconds - balls.first - DOWN) / max(balls.throws - 1, 1)
+    if every < SOONEST:
+        most = max(0, int((seconds - balls.first - DOWN) / SOONEST) + 1)
+        raise KumiteError(
+            f"throws: {balls.throws} in {seconds:g} s; expected at most {most}, or more seconds "
+            "(without --seconds the run lasts until all are thrown)"
+        )
+    balls = balls.model_copy(update={"every": every})
     return SceneSettings.model_construct(**{**dict(settings), "balls": balls})
 
 

@@ -1,0 +1,44 @@
+"""What a scene needs to run: a library of which kind, motions of which kinds, physics."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from kumite.scene.dodge import DodgeSettings
+from kumite.scene.errands import PrepareSettings
+from kumite.scene.fighters import BoutSettings
+from kumite.scene.settings import SceneSettings
+
+
+@dataclass(frozen=True)
+class Needs:
+    """What a scene is given when nothing is said, and what one's own has to hold."""
+
+    level: str  # of the library: 'kumite build --level'
+    style: str  # of the built-in performer, who stands in for a library
+    motions: tuple[str, ...]  # kinds of motion, or targets by label, that the library must hold
+    attackers: str | None = None  # the library of those who attack: a style, or a file
+    physics: str = "no"  # 'no', 'if installed' or 'yes': MuJoCo moves bodies that are struck
+
+    def to_json(self) -> dict[str, Any]:
+        return {**asdict(self), "motions": list(self.motions)}
+
+
+def needs(settings: SceneSettings) -> Needs:
+    """What a scene needs."""
+    if settings.walking:
+        labels = {t.motion for t in settings.targets}
+        labels |= set(settings.opponents.motions if settings.opponents else ())
+        style = (settings.prepare or PrepareSettings()).library
+        return Needs("preparation", style, ("walks", *sorted(labels)))
+    if settings.dodging:
+        style = (settings.dodge or DodgeSettings()).library
+        attackers = settings.attacker[0].library if settings.attacker else None
+        return Needs("avoidance", style, ("avoidance",), attackers)
+    if settings.fighters:
+        bout = settings.bout or BoutSettings()
+        physics = {"kinematic": "no", "auto": "if installed", "physical": "yes"}[bout.reactions]
+        motions = ("steps",) if bout.library == "locomotion" else ("blows", "steps", "defences")
+        return Needs("actions", bout.library, motions, physics=physics)
+    return Needs("frames", "boxing", ("blows", "steps"))
