@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from dataclasses import replace
@@ -11,13 +12,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.core import TyperGroup as Group
+from typer.main import get_command
 
+from kumite.cli.app import app
+from kumite.cli.progress import Lines, Stages
 from kumite.clip import forward_kinematics
 from kumite.export.bvh import write_bvh
 from kumite.graph import Library, load_library, save_library
 from kumite.graph.library import VERSION
 from kumite.mocap import load
 from kumite.performer import STYLES, perform
+from kumite.scene import LiveScene, load_recording
 from tests import toys
 
 
@@ -80,8 +86,6 @@ def test_from_mocap_files_to_a_fight(kumite, library: Library, tmp_path: Path):
     status, _, _ = kumite("export", "fight.rec", "-o", "red.bvh", "--character", "red")
     assert status == 0
     back = load(tmp_path / "red.bvh").clips[0]
-    from kumite.scene import load_recording
-
     red = load_recording(tmp_path / "fight.rec").clip("red")
     a, _ = forward_kinematics(red.skeleton, red.root_position, red.wxyz)
     b, _ = forward_kinematics(back.skeleton, back.root_position, back.wxyz)
@@ -110,7 +114,9 @@ def test_from_mocap_files_to_a_graph_of_actions(
     assert f"{found.report['nodes']} nodes of postures alike within 1.5 rad" in text
 
     status, again, _ = kumite("info", "my.kumite")
-    assert status == 0 and all(row in text for row in again.splitlines())
+    rows = [row for row in again.splitlines() if not row.startswith(("clips: ", "skeleton: "))]
+    assert status == 0 and len(rows) >= 3 and all(row in text for row in rows)
+    assert all(f"{c.name} {c.seconds:.3g}"[:-1] in again for c in found.clips)
     values = json.loads(kumite("info", "my.kumite", "--json", "--plot", "hits.png")[1])
     assert values["level"] == "actions" and values["clips"] == 6
     ways = np.diff(found.table.action_start)
@@ -229,7 +235,7 @@ def test_likeness_is_shown_side_by_side(kumite, tmp_path: Path):
 
 def test_a_crowd_of_any_number(kumite, built: Path):
     status, text, _ = kumite("run", "crowd", "-l", built, "--count", "44", "--seconds", "4")
-    assert status == 0 and "4.0 s, 44 characters:" in text and "blows thrown" in text
+    assert status == 0 and "4.0 s, 44 characters" in text and "landed" in text
 
 
 def test_scenes_are_listed(kumite):
@@ -452,8 +458,6 @@ def test_a_target_out_of_every_grid_is_walked_to(kumite, built, tmp_path):
     """The stated fallback: it counts as standing on the rim of the approach grid."""
     (tmp_path / "far.toml").write_text(NOBODY_TO_HIT.replace("1.5, 1]", "1.5, 900]"))
     status, *_ = kumite("run", "far.toml", "-l", built, "--seconds", "8", "-o", "far.rec")
-    from kumite.scene import load_recording
-
     way = load_recording(tmp_path / "far.rec").root_position[:, 0, 2]
     assert status == 0 and way[-1] - way[0] > 1.0
 
@@ -488,3 +492,165 @@ def test_bench_prints_its_rows(kumite, library: Library, tmp_path):
     (row,) = json.loads(text)
     assert set(row) >= {"name", "value", "unit", "limit", "peak_mb"}
     assert row["value"] > 0 and row["peak_mb"] > 50
+
+
+# What commands say -------------------------------------------------------------------------------
+
+
+def _commands() -> dict:
+    command = get_command(app)
+    assert isinstance(command, Group)
+    return dict(command.commands)
+
+
+@pytest.mark.parametrize("name", sorted(_commands()))
+def test_help_is_printed_as_it_was_written(run, name: str):
+    """Every word of every option's help, "[m/s]" too."""
+    status, text, _ = run(name, "--help")
+    printed = "".join(text.split())
+    told = [p.help for p in _commands()[name].params if getattr(p, "help", None)]
+    assert status == 0 and told
+    for said in told:
+        assert "".join(said.split()) in printed, said
+    assert "--quiet" in printed
+
+
+def test_progress_is_told_in_lines_where_there_is_no_terminal(monkeypatch, capsys):
+    now = [0.0]
+    monkeypatch.setattr("kumite.cli.progress.monotonic", lambda: now[0])
+    lines = Lines()
+    bar = lines.add("running", total=1.0)
+    for step in range(1, 101):
+        now[0] = 0.5 * step
+        lines.update(bar, 0.01 * step)
+    stages = Stages(lines)
+    for stage in ("learning: batch 1", "learning: batch 2", "writing"):
+        stages(stage)
+    told = capsys.readouterr().err.splitlines()
+    assert told == [
+        "running",
+        "running: 10%, 45 s left",
+        "running: 30%, 35 s left",
+        "running: 70%, 15 s left",
+        "learning: batch 1",
+        "writing",
+    ]
+
+
+def test_quiet_says_results_only(kumite, built: Path):
+    for args in (["run", "sparring", "--quiet"], ["--quiet", "run", "sparring"]):
+        status, text, err = kumite(*args, "-l", built, "--seconds", "1")
+        assert status == 0 and "fight" in text and err == ""
+    _, _, err = kumite("run", "sparring", "-l", built, "--seconds", "1")
+    assert "running sparring" in err
+
+
+@pytest.fixture
+def ctrl_c():
+    """Ctrl-C is heeded, also where these tests run in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_ctrl_c_keeps_what_ran(kumite, built: Path, monkeypatch, tmp_path: Path):
+    """Once: the recording ends there and is written. Twice: nothing is."""
+    step, presses = LiveScene.step, []
+
+    def pressed(scene) -> bool:
+        if scene.frame in presses:
+            signal.raise_signal(signal.SIGINT)
+        return step(scene)
+
+    monkeypatch.setattr(LiveScene, "step", pressed)
+    args = ("run", "sparring", "-l", built, "--seconds", "9000", "-o", "cut.rec")
+    presses[:] = [60]
+    status, text, err = kumite(*args)
+    assert status == 130 and "interrupted after" in err and "wrote cut.rec" in text
+    cut = load_recording(tmp_path / "cut.rec")
+    assert len(cut) == 62  # the frame in which it was pressed is kept
+    (tmp_path / "cut.rec").unlink()
+    monkeypatch.setattr(LiveScene, "step", step)
+    kumite("run", "sparring", "-l", built, "--seconds", f"{62 / cut.fps}", "-o", "whole.rec")
+    assert np.array_equal(load_recording(tmp_path / "whole.rec").wxyz, cut.wxyz)
+    (tmp_path / "whole.rec").unlink()
+
+    def twice(scene) -> bool:
+        if scene.frame == 60:
+            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
+        return step(scene)
+
+    monkeypatch.setattr(LiveScene, "step", twice)
+    status, text, err = kumite(*args)
+    assert status == 130 and err.splitlines()[-1] == "interrupted" and "wrote" not in text
+    assert not list(tmp_path.iterdir())
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_ctrl_c_while_a_library_is_built_leaves_nothing(kumite, monkeypatch, tmp_path: Path):
+    def pressed(*args, **options):
+        signal.raise_signal(signal.SIGINT)
+
+    for clip in perform("locomotion", mirrored=False).clips[:2]:
+        write_bvh(tmp_path / "mocap" / f"{clip.name}.bvh", clip)
+    monkeypatch.setattr("kumite.graph.library.find_strikes", pressed)
+    status, _, err = kumite("build", "mocap", "-o", "my.kumite")
+    assert status == 130 and err.splitlines()[-1] == "interrupted"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["mocap"]
+
+
+def test_scene_names_are_completed(tmp_path: Path):
+    (tmp_path / "spar_mine.toml").touch()
+    (tmp_path / "spar_not.txt").touch()
+    typed = {"COMP_WORDS": "kumite run spar", "COMP_CWORD": "2"}
+    done = subprocess.run(
+        [Path(sys.executable).parent / "kumite"],
+        env={**os.environ, **typed, "_KUMITE_COMPLETE": "complete_bash"},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+    assert done.stdout.split() == ["sparring", "spar_mine.toml"], done.stderr
+
+
+def test_scenes_say_what_they_need(kumite):
+    told = json.loads(kumite("scenes", "--json")[1])
+    assert told["crowd"]["characters"] == 30 and told["target"]["characters"] == 1
+    assert all({"title", "shows", "characters", "needs"} <= set(s) for s in told.values())
+    needs = {name: s["needs"] for name, s in told.items()}
+    assert needs["sparring"]["level"] == "frames" and needs["boxing"]["physics"] == "if installed"
+    assert needs["slip"]["level"] == "avoidance" and needs["slip"]["attackers"] == "boxing"
+    assert needs["ball-kick"]["motions"] == ["walks", "kick_ball"]
+
+
+def test_all_balls_are_thrown(kumite, tmp_path: Path):
+    """As long as it takes; or, where a time is given, as fast as it takes."""
+    status, text, err = kumite("run", "dodgeball", "--throws", "14", "--json", "-o", "d.rec")
+    told = json.loads(text)
+    assert status == 0 and told["seconds"] > 30
+    assert told["reports"]["throws"]["dodger"]["thrown"] == 14
+    assert told["reports"]["throws"]["dodger"]["in flight at the end"] == 0
+    again = json.loads(kumite("metrics", "d.rec", "--json")[1])
+    assert again == told
+    args = ("run", "dodgeball", "--throws", "14", "--seconds", "10", "--json")
+    status, text, err = kumite(*args)
+    told = json.loads(text)
+    assert told["seconds"] == pytest.approx(10) and "a ball every 0.54 s" in err
+    assert told["reports"]["throws"]["dodger"]["thrown"] == 14
+    status, _, err = kumite("run", "dodgeball", "--throws", "1000", "--seconds", "10")
+    assert status == 2 and "expected at most 351" in err
+
+
+def test_a_recording_says_what_it_holds(kumite, built: Path, library: Library):
+    kumite("run", "sparring", "-l", built, "--seconds", "4", "--seed", "7", "-o", "a.rec")
+    status, text, _ = kumite("info", "a.rec")
+    assert status == 0 and "Sparring, seed 7: 4.0 s" in text and "characters: red, blue" in text
+    told = json.loads(kumite("info", "a.rec", "--json")[1])
+    assert told["library"] == json.loads(kumite("info", built, "--json")[1])["digest"]
+    assert told["joints"] == len(library.clips.skeleton)
+    assert told["events"]["strike"] >= told["events"]["hit"]
+    status, _, err = kumite("info", "a.rec", "--fps", "30")
+    assert status == 2 and "a.rec is a recording" in err

@@ -11,6 +11,8 @@ from PIL import Image
 from kumite.body import body_mesh, palettes
 from kumite.clip import forward_kinematics
 from kumite.errors import KumiteError
+from kumite.export.moment_sheet import LANDED, moment_image, moment_sheet
+from kumite.export.moments import moments
 from kumite.export.plot import plot_hits
 from kumite.export.sheet import (
     BACKGROUND,
@@ -24,7 +26,7 @@ from kumite.export.sheet import (
 )
 from kumite.graph import Library
 from kumite.kernels.raster import draw_triangles
-from kumite.scene import LiveScene, load_scene, record
+from kumite.scene import Event, LiveScene, Recording, load_scene, record
 from tests import toys
 
 
@@ -130,3 +132,67 @@ def test_hits_are_plotted(library: Library, tmp_path):
         assert (tmp_path / f"hits.{ending}").stat().st_size > 10_000
     with pytest.raises(KumiteError, match=r"expected \.png"):
         plot_hits(tmp_path / "hits.xyz", library.strikes, "performer")
+
+
+@pytest.fixture(scope="module")
+def fight(library: Library) -> Recording:
+    return record(LiveScene(load_scene("sparring"), library, seed=3), 8.0)
+
+
+def test_a_sheet_shows_the_hits(fight: Recording, tmp_path):
+    """As many cells as hits, each in its frame, both fighters large in it, the hit marked."""
+    hits = [e for e in fight.events if e.kind == "hit"]
+    found = moments(fight, "hits", most=5)
+    assert len(found) == 5 < len(hits) and found == sorted(found, key=lambda m: m.frame)
+    frames = [round(e.data["time"] * fight.fps) for e in hits]
+    assert {m.frame for m in found} <= set(frames)
+    assert found[0].frame == frames[0] and found[-1].frame == frames[-1]
+    text = found[0].text.replace(" ", "_")
+    assert hits[0].data["part"] in text and hits[0].character in text
+
+    image = moment_image(fight, found[:2], size=(180, 160)).astype(int)
+    for x in (0, 182):
+        cell = image[:, x : x + 180]
+        marked = np.abs(cell - LANDED).sum(axis=-1) < 40
+        red = cell[..., 0] - cell[..., 2] > 60
+        blue = cell[..., 2] - cell[..., 0] > 60
+        assert marked.sum() > 10 and (red & ~marked).sum() > 200 and blue.sum() > 200
+        worn = np.argwhere(red | blue)[:, 0]
+        assert np.ptp(worn) > 0.45 * 160  # shorts to head: near
+    evenly = moment_image(fight, moments(fight, "evenly", most=2), size=(180, 160)).astype(int)
+    assert not (np.abs(evenly - LANDED).sum(axis=-1) < 40).any()
+    moment_sheet(tmp_path / "a.png", fight, "blows")
+    assert Image.open(tmp_path / "a.png").size == (4 * 362 - 2, 3 * 332 - 2)
+    with pytest.raises(KumiteError, match="'throws'.*expected one of .*hits"):
+        moment_sheet(tmp_path / "b.png", fight, "throws")
+    assert [p.name for p in tmp_path.iterdir()] == ["a.png"]
+
+
+def test_a_ball_is_shown_where_it_comes_nearest():
+    """A ball flies past at 2 m/s and comes down later, when it is told that it was avoided."""
+    clip = toys.still(60)
+    skeleton, frames = clip.skeleton, np.arange(60)
+    ball = np.stack([2.0 - frames / 15.0, np.full(60, 1.0), np.full(60, 0.6)], axis=1)
+    recording = Recording(
+        scene="made up",
+        fps=30.0,
+        skeleton=skeleton,
+        names=("anna",),
+        root_position=clip.root_position[:, None],
+        wxyz=clip.wxyz[:, None],
+        contacts=np.ones((60, 1, 2)),
+        library_frame=np.zeros((60, 1)),
+        objects=("ball 1",),
+        object_position=ball[:, None],
+        events=(
+            Event(2, "throw", "anna", {"attack": 1, "ball": "ball 1"}),
+            Event(3, "avoidance", "anna", {"attack": 1, "outcome": "found"}),
+            Event(55, "avoided", "anna", {"attack": 1}),
+            Event(58, "avoided", "anna", {"attack": 2}),  # by luck: not shown
+        ),
+    )
+    (moment,) = moments(recording)
+    joints, _ = forward_kinematics(skeleton, clip.root_position, clip.wxyz)
+    away = np.linalg.norm(joints - ball[:, None], axis=-1).min(axis=1)
+    assert moment.frame == away.argmin() == 30 and "avoids a ball" in moment.text
+    assert np.allclose(moment.trail[-1], ball[30]) and len(moment.trail) == 10

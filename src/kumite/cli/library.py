@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from kumite.graph.preparing import Preparing
 
 ENDING = ".kumite"
+MOST_CLIPS = 20  # named by info
 
 
 def is_library(source: Path | str) -> bool:
@@ -201,10 +202,20 @@ def show_library(path: Path | str, plot: Path | None, as_json: bool, given: list
         from kumite.export.plot import plot_hits
 
         plot_hits(plot, library.strikes, str(path))
+    clips = library.clips
+    names = dict(zip(clips.names, (round(c.seconds, 2) for c in clips)))
     if as_json:
-        print_json(library_values(library))
+        held = {"digest": library.digest, "joints": len(clips.skeleton), "seconds": names}
+        print_json({**library_values(library), **held})
         return
-    for line in library_lines(library):
+    shown = [f"{name} {s:g} s" for name, s in names.items()]
+    more = [f"and {len(shown) - MOST_CLIPS} more"] if len(shown) > MOST_CLIPS else []
+    lines = [
+        *library_lines(library),
+        f"clips: {', '.join(shown[:MOST_CLIPS] + more)}",
+        f"skeleton: {len(clips.skeleton)} joints; digest {library.digest}",
+    ]
+    for line in lines:
         out.print(line, markup=False, highlight=False)
     out.print(worth_table(library))
     if plot is not None:

@@ -18,6 +18,7 @@ from kumite.cli.library import (
 )
 from kumite.cli.progress import Bars, Stages, progress
 from kumite.cli.reading import FpsOption, Reading, SkipBad, Source, reads_mocap
+from kumite.cli.recording import is_recording, show_recording
 from kumite.errors import KumiteError, unknown
 
 if TYPE_CHECKING:
@@ -28,7 +29,9 @@ SHORTEST_ACTION = 0.25  # s; below it a graph is too fine to fight by
 
 SourceOrLibrary = Annotated[
     list[str],
-    typer.Argument(help="Mocap: a folder, a glob, .bvh files, .amc files; or one library."),
+    typer.Argument(
+        help="Mocap: a folder, a glob, .bvh files, .amc files; or one library or recording."
+    ),
 ]
 
 
@@ -44,16 +47,19 @@ def info(
     *,
     reading: Reading,
 ) -> None:
-    """What is in motion capture files (rates, blows, all that was inferred), or in a library.
+    """What is in motion capture files (with all that was inferred), a library or a recording.
 
     Ends with status 3 if some of the files cannot be read, 2 if none can.
     """
     from kumite.annotate import Strikes, find_strikes
     from kumite.clip import LIMBS, check, concatenate
 
+    given = [*([] if fps is None else ["--fps"]), *reading.given()]
     if len(source) == 1 and is_library(source[0]):
-        given = [*([] if fps is None else ["--fps"]), *reading.given()]
         show_library(source[0], plot, as_json, given)
+        return
+    if len(source) == 1 and is_recording(source[0]):
+        show_recording(source[0], as_json, [*([] if plot is None else ["--plot"]), *given])
         return
     loaded = reading.load(source, fps, skip_bad=True)
     hits: dict[str, dict[str, int]] = {}

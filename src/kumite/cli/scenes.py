@@ -113,6 +113,15 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
         return LiveScene(settings, found, seed=seed, cache=cache, progress=Training(bars))
 
 
+AtOption = Annotated[
+    str | None,
+    typer.Option(
+        help="What a .png shows: hits, avoided, passed, launches, blows, any other kind of event "
+        "of the recording, or evenly (default: what it is about)."
+    ),
+]
+
+
 @app.command()
 def run(
     scene: Annotated[
@@ -136,6 +145,7 @@ def run(
         list[Path] | None,
         typer.Option("--out", "-o", help="Write .rec, .glb, .bvh or .png; may be repeated."),
     ] = None,
+    at: AtOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Run a scene without drawing, record it, and print how good it is.
@@ -167,7 +177,7 @@ def run(
         err.print(f"interrupted after {recording.seconds:.1f} of {seconds:g} s", highlight=False)
     for path in output or []:
         say(f"writing {path}")
-        _export(recording, path)
+        _export(recording, path, at)
     show_metrics(measure(recording), as_json)
     if not as_json:
         for line in (*_thinking(live), *(f"wrote {path}" for path in output or [])):
@@ -180,10 +190,11 @@ def run(
 def _asked_to_stop() -> Iterator[threading.Event]:
     """Whether Ctrl-C was pressed: the first time it only asks, the second time it interrupts."""
     asked = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
+    before = signal.getsignal(signal.SIGINT)
+    in_main = threading.current_thread() is threading.main_thread()
+    if not in_main or before is not signal.default_int_handler:  # it is ignored, or another's
         yield asked
         return
-    before = signal.getsignal(signal.SIGINT)
 
     def ask(number: int, frame: Any) -> None:
         asked.set()
@@ -239,7 +250,7 @@ def _check_outputs(paths: list[Path], names: Sequence[str]) -> None:
         refuse_unwritable(path)
 
 
-def _export(recording: Any, path: Path) -> None:
+def _export(recording: Any, path: Path, at: str | None = None) -> None:
     suffix = _exporter(path)
     if suffix == ".rec":
         from kumite.scene import save_recording
@@ -254,9 +265,9 @@ def _export(recording: Any, path: Path) -> None:
 
         write_bvh(path, recording.clip(recording.names[0]))
     else:
-        from kumite.export.sheet import recording_sheet
+        from kumite.export.moment_sheet import moment_sheet
 
-        recording_sheet(path, recording)
+        moment_sheet(path, recording, at)
 
 
 @app.command()
@@ -269,6 +280,7 @@ def export(
     character: Annotated[
         str | None, typer.Option(help="Which character (a BVH file holds one).")
     ] = None,
+    at: AtOption = None,
 ) -> None:
     """Write a recording as GLB (all characters), BVH (one of them) or a contact sheet."""
     for path in output:
@@ -280,7 +292,7 @@ def export(
         loaded = loaded.only(character)
     _check_outputs(output, loaded.names)
     for path in output:
-        _export(loaded, path)
+        _export(loaded, path, at)
         out.print(f"wrote {path}", markup=False, highlight=False)
 
 

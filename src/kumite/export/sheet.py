@@ -389,8 +389,8 @@ def _labelled(image: np.ndarray, text: str) -> np.ndarray:
     return np.asarray(picture)
 
 
-def _save(path: Path | str, cells: Sequence[np.ndarray], columns: int) -> None:
-    """Cells [H, W, 3] side by side with a thin gap, written whole or not at all."""
+def sheet_of(cells: Sequence[np.ndarray], columns: int) -> np.ndarray:
+    """Cells [H, W, 3] side by side with a thin gap."""
     high, wide = cells[0].shape[:2]
     rows = -(-len(cells) // columns)
     gap = 2
@@ -398,5 +398,10 @@ def _save(path: Path | str, cells: Sequence[np.ndarray], columns: int) -> None:
     for i, cell in enumerate(cells):
         y, x = (i // columns) * (high + gap), (i % columns) * (wide + gap)
         sheet[y : y + high, x : x + wide] = cell
+    return sheet
+
+
+def _save(path: Path | str, cells: Sequence[np.ndarray], columns: int) -> None:
+    """A sheet, written whole or not at all."""
     with files.writing(path) as temporary:
-        Image.fromarray(sheet).save(temporary, format="PNG")
+        Image.fromarray(sheet_of(cells, columns)).save(temporary, format="PNG")

@@ -62,9 +62,18 @@ def _where(events: Iterable[Event], **data: Any) -> list[Event]:
     return [e for e in events if all(e.data.get(key) == value for key, value in data.items())]
 
 
+def _catches(recording: Recording) -> bool:
+    """Whether its scene is about catching someone."""
+    bout = recording.settings.get("scene", {}).get("bout") or {}
+    return bool(bout.get("catch"))
+
+
 def _fight(recording: Recording, events: Events) -> Report | None:
-    """Blows at each other or at a target. Those of people on errands have a report of their own."""
-    if "strike" not in events or "launch" in events:
+    """Blows at each other or at a target, also where none was thrown. Those of people on errands
+    have a report of their own.
+    """
+    could = recording.settings.get("aims_at") and not _catches(recording)
+    if "launch" in events or not ("strike" in events or could):
         return None
     hits = events["hit"]
     reactions, run_over = events["reaction"], events["run over"]
@@ -91,7 +100,7 @@ def _throws(recording: Recording, events: Events) -> Report | None:
     """
     if "throw" not in events:
         return None
-    ways_out = _found(events)
+    ways_out = found_ways_out(events["avoidance"])
     end = {e.data["attack"]: e for kind in ("avoided", "missed", "struck") for e in events[kind]}
     rows = {}
     for name in recording.names:
@@ -109,9 +118,10 @@ def _throws(recording: Recording, events: Events) -> Report | None:
     return Report("throws", rows)
 
 
-def _found(events: Events) -> set[tuple[int, str]]:
+def found_ways_out(events: Iterable[Event]) -> set[tuple[int, str]]:
     """Attacks, and who has found a way out of them."""
-    return {(e.data["attack"], e.character) for e in _where(events["avoidance"], outcome=FOUND)}
+    found = _where(events, outcome=FOUND)
+    return {(e.data["attack"], e.character) for e in found if e.kind == "avoidance"}
 
 
 def _end_of_throw(attack: int, end: Event | None, ways_out: set[tuple[int, str]], name: str) -> str:
@@ -129,7 +139,7 @@ def _blows_avoided(recording: Recording, events: Events) -> Report | None:
     if "foreseen" not in events:
         return None
     gap = {e.data["attack"]: float(e.data["gap"]) for e in events["foreseen"]}
-    ways_out = _found(events)
+    ways_out = found_ways_out(events["avoidance"])
     rows = {}
     for name in recording.names:
         coming = {e.data["attack"] for e in _where(events["foreseen"], at=name)}
@@ -198,8 +208,7 @@ def _launches(recording: Recording, events: Events) -> Report | None:
 
 def _chase(recording: Recording, events: Events) -> Report | None:
     """Who was caught, and when. Also where nobody was, if the scene is about that."""
-    bout = recording.settings.get("scene", {}).get("bout") or {}
-    if "caught" not in events and not bout.get("catch"):
+    if "caught" not in events and not _catches(recording):
         return None
     rows = {}
     for name in recording.names:
