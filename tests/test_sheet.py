@@ -163,7 +163,7 @@ def test_a_sheet_shows_the_hits(fight: Recording, tmp_path):
     assert not (np.abs(evenly - LANDED).sum(axis=-1) < 40).any()
     moment_sheet(tmp_path / "a.png", fight, "blows")
     assert Image.open(tmp_path / "a.png").size == (4 * 362 - 2, 3 * 332 - 2)
-    with pytest.raises(KumiteError, match="'throws'.*expected one of .*hits"):
+    with pytest.raises(KumiteError, match=r"'throws'.*expected one of .*hits"):
         moment_sheet(tmp_path / "b.png", fight, "throws")
     assert [p.name for p in tmp_path.iterdir()] == ["a.png"]
 
