@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -79,15 +80,18 @@ def library_lines(library: Library) -> list[str]:
         return lines + _preparation_lines(library)
     if library.actions is None:
         mean = table.duration[table.stretch].mean() / clips.fps
-        kept = f"{r['frames_kept']} frames connected, {r['hits_kept']} blows in them: " if r else ""
+        kept = ""
+        if _says(r, "frames_kept", "hits_kept"):
+            kept = f"{r['frames_kept']} frames connected, {r['hits_kept']} blows in them: "
         lines.append(
             f"{kept}{table.states} states, {table.actions} actions of {mean:.2f} s on average"
         )
-        if r:
-            if r.get("level") == "avoidance":
+        if _says(r, "transitions", "candidates", "mean_join_cost", "threshold"):
+            if r.get("level") == "avoidance" and "every" in r:
                 where = f"an avoidance may be begun every {r['every']:g} s"
             else:
-                where = "anywhere" if r["event"] == "none" else f"{r['event']} lift-off"
+                event = r.get("event", "none")
+                where = "anywhere" if event == "none" else f"{event} lift-off"
             lines.append(
                 f"{r['transitions']} transitions of {r['candidates']} candidates ({where}), "
                 f"mean join cost {r['mean_join_cost']:.2f}, accepted below {r['threshold']:.2f}"
@@ -98,9 +102,13 @@ def library_lines(library: Library) -> list[str]:
     joined = table.join_cost[table.join_cost > 0]
     lines += [
         f"{len(library.actions)} actions, {len(table.first)} of them connected"
-        + (f" ({r['hits_kept']} blows)" if r else "")
+        + (f" ({r['hits_kept']} blows)" if "hits_kept" in r else "")
         + f", of {table.duration.mean() / clips.fps:.2f} s on average: {counts}",
-        (f"{r['nodes']} nodes of postures alike within {r['alike']:g} rad; " if r else "")
+        (
+            f"{r['nodes']} nodes of postures alike within {r['alike']:g} rad; "
+            if _says(r, "nodes", "alike")
+            else ""
+        )
         + f"after an action {ways.min()} to {ways.max()} are offered, {ways.mean():.1f} on "
         "average, reactions never",
     ]
@@ -122,6 +130,10 @@ def worth_table(library: Library) -> Table:
     for label, text in assess(library).rows():
         table.add_row(Text(label), Text(text))
     return table
+
+
+def _says(report: Mapping[str, Any], *names: str) -> bool:
+    return all(name in report for name in names)
 
 
 def _preparation_lines(library: Library) -> list[str]:

@@ -16,6 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
+from kumite.checks import freeze, instance, number, whole
 from kumite.clip import LIMBS
 from kumite.control.grid import TargetGrid, approach_grid, heading_grid, strike_grid
 from kumite.errors import KumiteError
@@ -189,6 +190,16 @@ class Policy:
     sweeps: int
     backups: int  # Bellman backups done: actions × grid points × sweeps
     seconds: float
+
+    def __post_init__(self) -> None:
+        instance(self.behaviour, Behaviour, "policy: behaviour")
+        freeze(self, "policy", value=(np.float32, ("N", len(self.behaviour.grid))))
+        instance(self.converged, bool, "policy: converged")
+        whole(self.sweeps, "policy: sweeps", least=0)
+        whole(self.backups, "policy: backups", least=0)
+        number(self.seconds, "policy: seconds", least=0.0)
+        if self.residual != np.inf:  # of no sweep
+            number(self.residual, "policy: residual", least=0.0)
 
     @cached_property
     def grid_arguments(self) -> tuple:

@@ -38,10 +38,10 @@ def trained(
     if path is not None and path.exists():
         try:
             header, arrays = files.load(path, KIND, VERSION)
-            value = arrays["value"]
-            if value.shape == (library.table.states, len(behaviour.grid)):
-                return Policy(behaviour, value, **header)
-        except (KumiteError, KeyError, TypeError):
+            found = Policy(behaviour, arrays["value"], **header)
+            if len(found.value) == library.table.states:
+                return found
+        except files.UNREADABLE:
             pass  # damaged or of another version: solve it again and write it anew
     policy = solve(
         library,

@@ -23,6 +23,7 @@ from kumite.annotate import (
     find_strikes,
     no_avoidance,
 )
+from kumite.checks import mapping, number, text, whole
 from kumite.clip import ClipSet, Skeleton
 from kumite.errors import KumiteError
 from kumite.graph.distance import pose_features
@@ -39,6 +40,11 @@ from kumite.graph.transitions import (
 )
 
 KIND = "library"
+_REPORTED = {
+    **dict.fromkeys(("event", "level"), text),
+    **dict.fromkeys(("every", "threshold", "mean_join_cost", "mean_action_s", "alike"), number),
+    **dict.fromkeys(("transitions", "candidates", "frames_kept", "hits_kept", "nodes"), whole),
+}  # what a report's values must be, where readers count on it
 VERSION = 5
 
 _NO_PARTS = no_avoidance(np.zeros(1, np.int64))  # of clips that are not known yet
@@ -58,6 +64,9 @@ class Library:
     preparing: Preparing | None = None  # what a hierarchical graph is made of
 
     def __post_init__(self) -> None:
+        for name, value in mapping(self.report, "library: report").items():
+            if name in _REPORTED:
+                _REPORTED[name](value, f"library: report: {name}")
         frames = len(self.clips)
         if len(self.avoidance) == 0:
             object.__setattr__(self, "avoidance", no_avoidance(self.clips.clip_start))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kumite import files
+from kumite import checks, files
 from kumite.clip import Clip, runs
 from kumite.errors import KumiteError
 from kumite.performer.perform import Performance, perform
@@ -30,7 +30,7 @@ def performed(
     key = files.code_digest("performer", "body", "clip", "rotation")
     path = cache / f"performance-{style}-{seed}-{'both' if mirrored else 'one'}-{key}.kumite"
     if path.exists():
-        with contextlib.suppress(KumiteError):  # damaged: made anew
+        with contextlib.suppress(*files.UNREADABLE):  # damaged: made anew
             return _load(path, armed=STYLES[style].armed)
     made = perform(style, seed, mirrored=mirrored)
     with contextlib.suppress(KumiteError):  # a cache that cannot be written only costs time
@@ -72,22 +72,24 @@ def _save(path: Path, made: Performance) -> None:
 
 
 def _load(path: Path, *, armed: bool) -> Performance:
+    """Errors: as :func:`files.load`; content that is no performance's (``files.UNREADABLE``)."""
     header, arrays = files.load(path, KIND, VERSION)
-    cuts = np.cumsum(arrays["frames"])[:-1]
-    root, wxyz, ground = (np.split(arrays[k], cuts) for k in ("root_position", "wxyz", "on_ground"))
-    clips = []
-    for name, r, q in zip(header["names"], root, wxyz):
+    frames = checks.array(arrays["frames"], "frames", ("C",), np.int64, least=1)
+    names = checks.names(header["names"], "clip names", least=1)
+    total = len(arrays["on_ground"])
+    if not (len(names) == len(frames) == len(header["truth"]) and sum(frames.tolist()) == total):
+        raise KumiteError(f"{path}: damaged {KIND}")
+    cuts = np.cumsum(frames)[:-1]
+    parts = [np.split(arrays[k], cuts) for k in ("root_position", "wxyz", "on_ground")]
+    clips, truths = [], []
+    for name, events, count, root, wxyz, on_ground in zip(names, header["truth"], frames, *parts):
         hand = ("left" if name.endswith("_mirrored") else "right") if armed else None
-        clips.append(Clip(name, skeleton(armed=hand), FPS, r, q))
-    truths = []
-    for on_ground, events in zip(ground, header["truth"]):
+        clips.append(Clip(name, skeleton(armed=hand), FPS, root, wxyz))
         strikes = tuple(
-            Strike(s["frame"], s["limb"], np.array(s["tip"]), np.array(s["velocity"]))
-            for s in events["strikes"]
+            Strike(s["frame"], s["limb"], s["tip"], s["velocity"]) for s in events["strikes"]
         )
-        actions = tuple(
-            Action(**{**a, "avoid": tuple(a["avoid"]) if a["avoid"] else None})
-            for a in events["actions"]
-        )
+        actions = tuple(Action(**a) for a in events["actions"])
+        if len(clips[-1]) != count:
+            raise KumiteError(f"{path}: damaged {KIND}")
         truths.append(Truth(on_ground, strikes, actions))
     return Performance(tuple(clips), tuple(truths))

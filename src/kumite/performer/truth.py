@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kumite import checks
 from kumite.clip import Clip, forward_kinematics, tip_positions
+from kumite.errors import KumiteError
 
 if TYPE_CHECKING:
     from kumite.performer.take import Performed
@@ -23,6 +25,11 @@ class Strike:
     tip: np.ndarray  # [3] m, world
     velocity: np.ndarray  # [3] m/s of the tip, by central differences
 
+    def __post_init__(self) -> None:
+        checks.whole(self.frame, "strike: frame", least=0)
+        checks.text(self.limb, "strike: limb")
+        checks.freeze(self, "strike", tip=(float, (3,)), velocity=(float, (3,)))
+
 
 @dataclass(frozen=True)
 class Action:
@@ -35,6 +42,17 @@ class Action:
     avoid: tuple[int, int] | None = None  # frames in which the body is out of where it was
     mark: int | None = None  # first frame of a target movement
 
+    def __post_init__(self) -> None:
+        checks.whole(self.start, "action: start", least=0)
+        checks.whole(self.stop, "action: stop", least=self.start)
+        checks.text(self.kind, "action: kind")
+        checks.text(self.label, "action: label")
+        if self.avoid is not None:
+            first, last = (checks.whole(f, "action: avoid", least=0) for f in self.avoid)
+            object.__setattr__(self, "avoid", (first, last))
+        if self.mark is not None:
+            checks.whole(self.mark, "action: mark", least=0)
+
 
 @dataclass(frozen=True)
 class Truth:
@@ -43,6 +61,12 @@ class Truth:
     on_ground: np.ndarray  # [F, 2] bool, left and right foot planted
     strikes: tuple[Strike, ...]
     actions: tuple[Action, ...]
+
+    def __post_init__(self) -> None:
+        frames = checks.freeze(self, "truth", on_ground=(np.bool_, ("F", 2)))["F"]
+        ends = [s.frame for s in self.strikes] + [a.stop for a in self.actions]
+        if max(ends, default=0) > frames:
+            raise KumiteError(f"truth: something happens after the {frames} frames")
 
 
 def authored_strikes(

@@ -1,0 +1,421 @@
+"""What is fuzzed: how a case is made from a generator, and what is done with it.
+
+A case must end in a result or a :class:`KumiteError`. Whatever else it raises is a find.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import json
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from safetensors.numpy import save as save_tensors
+
+from kumite import files, mocap, performer
+from kumite.annotate import (
+    find_contacts,
+    find_cycles,
+    read_actions,
+    read_avoidance,
+    read_marked,
+)
+from kumite.body import lay_spheres, load_spheres, save_spheres
+from kumite.cli.library import library_lines, library_values
+from kumite.clip import Clip, ClipSet, concatenate, resample
+from kumite.control import build_table, read_table, trained, write_table
+from kumite.control.policy import BEHAVIOURS
+from kumite.errors import KumiteError
+from kumite.export.bvh import write_bvh
+from kumite.export.gltf import write_glb
+from kumite.export.sheet import recording_sheet
+from kumite.graph import (
+    Library,
+    build_action_library,
+    build_library,
+    build_preparation_library,
+    load_library,
+    save_library,
+)
+from kumite.graph.hierarchy import authored_targets
+from kumite.mocap.asfamc import read_amc, read_asf
+from kumite.mocap.bvh import read_bvh
+from kumite.performer import kept
+from kumite.scene import (
+    LiveScene,
+    Playback,
+    load_recording,
+    load_scene,
+    measure,
+    record,
+    save_recording,
+)
+from kumite.scene import recording as recordings
+from kumite.scene.recording import Recording
+from kumite.studio.wording import EventLog, describe, lines_html, place, score_html, struck
+from tests.fuzz import mutate
+from tests.test_asfamc import AMC, ASF
+
+Rng = np.random.Generator
+Case = Callable[[Rng, Path], None]
+
+
+# Small things to begin with --------------------------------------------------------------------
+
+
+@functools.cache
+def clips(style: str = "boxing") -> ClipSet:
+    made = performer.perform(style, mirrored=False)
+    voluntary = [
+        c for c, t in zip(made.clips, made.truth) if all(a.kind != "reaction" for a in t.actions)
+    ]
+    return concatenate([resample(c, 15.0) for c in voluntary[:8]])
+
+
+@functools.cache
+def libraries() -> dict[str, Library]:
+    """One of every level."""
+    made = performer.perform("targets", mirrored=False)
+    fps = 15.0
+    walks = concatenate([resample(c, fps) for c in made.clips])
+    targets, contacts = authored_targets(walks, made.truth, made.clips[0].fps), find_contacts(walks)
+    cycles = find_cycles(walks, contacts)
+    return {
+        "frames": build_library(clips(), avoidance=True, event="both"),
+        "actions": build_action_library(clips()),
+        "preparation": build_preparation_library(walks, targets, cycles, contacts=contacts),
+    }
+
+
+@functools.cache
+def fight() -> Recording:
+    """Two who spar, with a ball and an event of every kind that is told."""
+    scene = LiveScene(load_scene("sparring"), libraries()["frames"], seed=1)
+    made = record(scene, 2.0)
+    at = {"place": [0.1, 1.4, 0.2], "speed": 6.5}
+    more = [
+        ("hit", {"victim": "blue", "limb": "left_hand", "part": "head", "blocked": True, **at}),
+        ("throw", {"attack": 1, "ball": "ball 1", **at}),
+        ("avoidance", {"attack": 1, "outcome": "found", "aim": 0.4, "candidates": 5, "valid": 2,
+                       "costs": [0.1, 0.2, 0.3], "cost": 0.6, "distance": 0.2, "indexed": True}),
+        ("avoidance", {"attack": 2, "outcome": "too late", "hit": 3}),
+        ("avoided", {"attack": 1}),
+        ("missed", {"point": 1, "due": None, "by": 0.3}),
+        ("struck", {"attack": 2, "part": "chest", "meant": False, **at}),
+        ("stale", {"attack": 3, "dropped": 2}),
+        ("launch", {"motion": "kick_ball", "level": 0.5, "apart_deg": 3.0, "to_contact": 0.4,
+                    "bent": 0.05}),
+        ("done", {"motion": "kick_ball"}),
+        ("passed", {"thing": "beam", "clearance": 0.03}),
+        ("touched", {"thing": "beam", "part": "head"}),
+        ("moved goal", {"thing": "beam"}),
+        ("reaction", {"action": "hit", "size": "small", "impulse": 3.0, "deviation": None}),
+        ("check point", {"point": 1, "late_by": 0.1, "distance": 0.3}),
+        ("cue", {"style": {"preset": "boxer"}, "only": ["idle"]}),
+    ]  # fmt: skip
+    events = [recordings.Event(k, kind, "red", data) for k, (kind, data) in enumerate(more)]
+    frames = len(made)
+    return replace(
+        made,
+        objects=("ball", "car"),
+        object_position=np.full((frames, 2, 3), 0.5, np.float32),
+        rate=np.ones((frames, 2), np.float32),
+        events=(*made.events, *events),
+        settings={
+            **made.settings,
+            "object_radius": {"ball": 0.1},
+            "object_size": {"car": [1.7, 1.4, 4.0]},
+            "object_yaw": {"car": 0.5},
+            "object_wheels": ["car"],
+            "object_thrown": ["ball"],
+            "unarmed": ["blue"],
+        },
+    )
+
+
+# Files of ours, forged: with a checksum that fits ----------------------------------------------
+
+
+def forged(path: Path, kind: Any, version: Any, header: Any, arrays: Mapping[str, Any]) -> None:
+    """A file as :func:`kumite.files.save` writes it, of whatever content."""
+    tensors = {k: np.ascontiguousarray(v) for k, v in sorted(arrays.items())}
+    what = {"kind": kind, "version": version, "header": header}
+    what["crc32"] = files._checksum(header, tensors)
+    path.write_bytes(save_tensors(tensors, metadata={files.META_KEY: json.dumps(what)}))
+
+
+def _forge(rng: Rng, path: Path, good: Path, kind: str, version: int) -> None:
+    header, arrays = _content(good, kind, version)
+    for _ in range(int(rng.choice([1, 1, 1, 2]))):
+        if rng.random() < 0.55:
+            arrays = mutate.arrays(rng, arrays)
+        else:
+            header = mutate.json_value(rng, header)
+    try:
+        forged(path, kind, version, header, arrays)
+    except (UnicodeEncodeError, ValueError, OverflowError):  # what no file can hold
+        path.write_bytes(b"")
+    if rng.random() < 0.05:
+        path.write_bytes(mutate.text(rng, path.read_bytes()))
+
+
+@functools.cache
+def _content(good: Path, kind: str, version: int) -> tuple[dict, dict]:
+    return files.load(good, kind, version)
+
+
+def _saved(folder: Path, name: str, save: Callable[[Path], None]) -> Path:
+    path = folder / "good" / name
+    if not path.exists():
+        path.parent.mkdir(exist_ok=True)
+        save(path)
+    return path
+
+
+_turn = itertools.count()  # deep looks cost more: only some cases get one
+
+
+def forged_library(rng: Rng, folder: Path) -> None:
+    from kumite.graph.library import KIND, VERSION
+
+    level = str(rng.choice(["frames", "actions", "preparation"]))
+    good = _saved(folder, f"{level}.kumite", lambda p: save_library(p, libraries()[level]))
+    path = folder / "forged.kumite"
+    _forge(rng, path, good, KIND, VERSION)
+    library = load_library(path)
+    library_lines(library)
+    json.dumps(library_values(library), allow_nan=False)
+    if next(_turn) % 8 == 0:
+        save_library(folder / "again.kumite", library)
+        assert load_library(folder / "again.kumite").digest == library.digest
+        _run(library, level)
+
+
+def _run(library: Library, level: str) -> None:
+    """Have the characters of a scene made for it do something."""
+    from kumite.scene import BoutScene, PrepareScene
+
+    if level == "frames":
+        scene = LiveScene(load_scene("sparring"), library, seed=1)
+    elif level == "actions":
+        scene = BoutScene(load_scene("boxing"), library, seed=1)
+    else:
+        scene = PrepareScene(load_scene("ball-kick"), library, seed=1)
+    made = record(scene, 1.0)
+    measure(made)
+    assert np.isfinite(made.root_position).all()
+
+
+def forged_recording(rng: Rng, folder: Path) -> None:
+    good = _saved(folder, "fight.rec", lambda p: save_recording(p, fight()))
+    path = folder / "forged.rec"
+    _forge(rng, path, good, recordings.KIND, recordings.VERSION)
+    made = load_recording(path)
+    json.dumps(measure(made).to_json(), allow_nan=False)
+    stage = Playback(made)
+    log = EventLog(made.names, dodging=True, preparing=True)
+    log.show_quiet = True
+    while stage.step():
+        for event in log.update(stage.events, stage.frame):
+            describe(event)
+            if event.kind in ("hit", "struck"):
+                struck(event), place(event)
+        lines_html(log, stage.fps)
+    score_html(log)
+    turn = next(_turn)
+    if turn % 8 == 0:
+        write_glb(folder / "x.glb", made)
+        for name in made.names:
+            write_bvh(folder / "x.bvh", made.clip(name))
+    if turn % 40 == 0:
+        recording_sheet(folder / "x.png", made, [0, len(made) - 1], size=(64, 48))
+
+
+def forged_policy(rng: Rng, folder: Path) -> None:
+    """A damaged policy is solved again, never believed."""
+    library = libraries()["frames"]
+    behaviour = BEHAVIOURS["approach"](library)
+    good = folder / "good"
+    good.mkdir(exist_ok=True)
+    known = trained(library, behaviour, good)
+    (name,) = (p.name for p in good.glob("approach-*.policy"))
+    _forge(rng, folder / name, good / name, "policy", 1)
+    found = trained(library, behaviour, folder)
+    assert found.value.shape == known.value.shape and np.isfinite(found.value).all()
+    assert isinstance(found.converged, bool) and isinstance(found.sweeps, int)
+
+
+@functools.cache
+def _performance() -> performer.Performance:
+    made = performer.perform("boxing", mirrored=False)
+    return performer.Performance(made.clips[:2], made.truth[:2])
+
+
+def forged_performance(rng: Rng, folder: Path) -> None:
+    good = _saved(folder, "performance.kumite", lambda p: kept._save(p, _performance()))
+    path = folder / "forged-performance.kumite"
+    _forge(rng, path, good, kept.KIND, kept.VERSION)
+    try:
+        made = kept._load(path, armed=False)
+    except files.UNREADABLE as error:  # whoever asks makes it anew
+        raise KumiteError(str(error)[:100]) from None
+    for truth in made.truth:
+        json.dumps(performer.truth_to_json(truth), allow_nan=False)
+
+
+# Texts -----------------------------------------------------------------------------------------
+
+
+def _text_case(sources: Callable[[Path], list[bytes]], ending: str, read: Callable) -> Case:
+    """A case that changes one of some texts and has it read."""
+
+    def case(rng: Rng, folder: Path) -> None:
+        known = _sources(sources, folder)
+        source = mutate.text(rng, known[rng.integers(len(known))], known)
+        path = folder / f"fuzz{ending}"
+        path.write_bytes(source)
+        read(path)
+
+    return case
+
+
+@functools.cache
+def _sources(make: Callable[[Path], list[bytes]], folder: Path) -> list[bytes]:
+    return make(folder)
+
+
+def _bvh_sources(folder: Path) -> list[bytes]:
+    short = clips().clip(0)
+    write_bvh(folder / "a.bvh", Clip("a", short.skeleton, 15.0, short.root_position[:6],
+                                     short.wxyz[:6]))  # fmt: skip
+    arm = (
+        b"HIERARCHY\nROOT hip\n{\n OFFSET 0 0 0\n CHANNELS 6 Xposition Yposition Zposition "
+        b"Zrotation Xrotation Yrotation\n JOINT mid\n {\n  OFFSET 0 10 0\n  CHANNELS 3 Zrotation "
+        b"Xrotation Yrotation\n  End Site\n  {\n   OFFSET 0 5 0\n  }\n }\n}\nMOTION\nFrames: 2\n"
+        b"Frame Time: 0.0333\n0 90 0 1 2 3 4 5 6\n0 91 0 1.5 2 3 4 5e1 -6\n"
+    )
+    return [arm, arm, (folder / "a.bvh").read_bytes()]
+
+
+def _read_bvh(path: Path) -> None:
+    raw = read_bvh(path)
+    assert np.isfinite(raw.root_position).all() and np.isfinite(raw.wxyz).all()
+
+
+def _load_bvh(path: Path) -> None:
+    mocap.load(path, metres_per_unit=0.01)
+
+
+def _read_amc(path: Path) -> None:
+    raw = read_amc(path, _asf())
+    assert np.isfinite(raw.root_position).all() and np.isfinite(raw.wxyz).all()
+
+
+@functools.cache
+def _asf() -> Any:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "small.asf"
+        path.write_text(ASF)
+        return read_asf(path)
+
+
+def _scenes(folder: Path) -> list[bytes]:
+    found = resources.files("kumite.scene") / "builtin"
+    return [p.read_bytes() for p in sorted(found.iterdir(), key=str) if p.name.endswith(".toml")]
+
+
+def _read_scene(path: Path) -> None:
+    load_scene(str(path))
+
+
+def _settings(folder: Path) -> list[bytes]:
+    (folder / "a.bvh").touch()
+    return [
+        b'fps = 30\nup_axis = "Y"\nmetres_per_unit = 0.01\nground_height = 0.1\n'
+        b'[roles]\npelvis = "hips"\nleft_hand = "LeftWrist"\n'
+        b'[files."a.bvh"]\nfile_fps = 60\nname = "jab"\n'
+    ]
+
+
+def _read_settings(path: Path) -> None:
+    from kumite.mocap.settings import read_settings
+
+    path.rename(path.with_name("kumite.toml"))
+    read_settings(path.parent)
+
+
+def _actions(folder: Path) -> list[bytes]:
+    library = libraries()["actions"]
+    assert library.actions is not None
+    from kumite.annotate import write_actions
+
+    write_actions(folder / "actions.txt", library.actions, library.clips,
+                  libraries()["frames"].avoidance)  # fmt: skip
+    return [(folder / "actions.txt").read_bytes()]
+
+
+def _read_actions(path: Path) -> None:
+    found, library = None, libraries()["actions"]
+    for read in (read_actions, read_avoidance, read_marked):
+        try:
+            read(path, library.clips)
+        except KumiteError as error:
+            found = error
+    if found is not None:
+        raise found
+
+
+def _combinations(folder: Path) -> list[bytes]:
+    library = libraries()["actions"]
+    assert library.actions is not None
+    path = folder / "table.toml"
+    write_table(path, build_table(library, library.actions))
+    return [path.read_bytes()]
+
+
+def _read_table(path: Path) -> None:
+    library = libraries()["actions"]
+    assert library.actions is not None
+    read_table(path, library, library.actions)
+
+
+def _spheres(folder: Path) -> list[bytes]:
+    skeleton = clips().skeleton
+    save_spheres(folder / "spheres.toml", lay_spheres(skeleton), skeleton)
+    return [(folder / "spheres.toml").read_bytes()]
+
+
+def _read_spheres(path: Path) -> None:
+    load_spheres(path, clips().skeleton)
+
+
+def prepare(target: str) -> None:
+    """What is made, trained and compiled once is not held against a case."""
+    if target == "library":
+        for level, library in libraries().items():
+            for _ in range(3):  # compiled for one and for many
+                _run(library, level)
+
+
+TARGETS: dict[str, Case] = {
+    "library": forged_library,
+    "recording": forged_recording,
+    "policy": forged_policy,
+    "performance": forged_performance,
+    "bvh": _text_case(_bvh_sources, ".bvh", _read_bvh),
+    "mocap": _text_case(_bvh_sources, ".bvh", _load_bvh),
+    "asf": _text_case(lambda _: [ASF.encode()], ".asf", read_asf),
+    "amc": _text_case(lambda _: [AMC.encode()], ".amc", _read_amc),
+    "scene": _text_case(_scenes, ".toml", _read_scene),
+    "settings": _text_case(_settings, ".toml", _read_settings),
+    "actions": _text_case(_actions, ".txt", _read_actions),
+    "combinations": _text_case(_combinations, ".toml", _read_table),
+    "spheres": _text_case(_spheres, ".toml", _read_spheres),
+}
+"""What can be fuzzed, by name."""
