@@ -2,11 +2,12 @@
 # Both set up what they need in .venv first; nothing else is needed but Python ≥ 3.11.
 
 PYTHON ?= python3
+CASES ?= 3000  # of everything that make fuzz changes and has read
 BIN := .venv/bin
 RUN := .venv/.ready-to-run
 DEV := .venv/.ready-to-test
 
-.PHONY: demo test fast lint bench lock recording clean
+.PHONY: demo test fuzz fast lint bench lock recording clean
 
 demo: $(RUN)
 	$(BIN)/kumite studio sparring
@@ -17,6 +18,9 @@ test: lint
 
 fast: $(DEV)
 	$(BIN)/python -m pytest -m "not slow"
+
+fuzz: $(DEV)
+	$(BIN)/python -m tests.fuzz --cases $(CASES)
 
 lint: $(DEV)
 	$(BIN)/ruff check .

@@ -24,7 +24,7 @@ _BYTES = (b"\0", b"\x1f", b"\xff", b"\xc3\xa9", b"\xed\xa0\x80", b"\r", b"\n", b
 def text(rng: Rng, source: bytes, others: Sequence[bytes] = ()) -> bytes:
     """A text with one to four things changed."""
     for _ in range(int(rng.choice([1, 1, 1, 2, 4]))):
-        source = _TEXT[rng.integers(len(_TEXT))](rng, source, others)
+        source = _TEXT[int(rng.integers(len(_TEXT)))](rng, source, others)
     return source
 
 
@@ -77,14 +77,14 @@ def _lines(rng: Rng, source: bytes, _: Any) -> bytes:
 
 
 def _word(rng: Rng, source: bytes, _: Any) -> bytes:
-    words = re.split(rb"(\s+)", source)
+    words: list[bytes] = re.split(rb"(\s+)", source)
     a, b = (int(k) // 2 * 2 for k in rng.integers(len(words), size=2))
-    words[a] = words[b] if rng.random() < 0.7 else b""
+    words[a] = b"" if rng.random() < 0.3 else words[b]
     return b"".join(words)
 
 
 def _splice(rng: Rng, source: bytes, others: Sequence[bytes]) -> bytes:
-    other = others[rng.integers(len(others))] if others else source
+    other = others[int(rng.integers(len(others)))] if others else source
     a, b = int(rng.integers(len(source) + 1)), int(rng.integers(len(other) + 1))
     return source[:a] + other[b : b + 4 * _length(rng)] + source[a + _length(rng) :]
 
@@ -127,7 +127,7 @@ def json_value(rng: Rng, value: Any) -> Any:
     places = _places(value)[1:]
     if not places:
         return EXTREMES[rng.integers(len(EXTREMES))]
-    *way, key = places[rng.integers(len(places))]
+    *way, key = places[int(rng.integers(len(places)))]
     inside = value
     for k in way:
         inside = inside[k]

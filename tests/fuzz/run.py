@@ -46,11 +46,20 @@ class Result:
 
 
 def run(
-    target: str, cases: int, seed: int = 0, *, limit: float = 5.0, folder: Path | None = None
+    target: str,
+    cases: int,
+    seed: int = 0,
+    *,
+    limit: float = 5.0,
+    folder: Path | None = None,
+    deep: bool = True,
 ) -> Result:
-    """Cases ``seed`` … ``seed + cases - 1`` of a target. The same seed makes the same case."""
+    """Cases ``seed`` … ``seed + cases - 1`` of a target. The same seed makes the same case.
+
+    deep: of some files that can be read, run scenes and write exports, too.
+    """
     result = Result(target)
-    prepare(target)
+    prepare(target, deep)
     with contextlib.ExitStack() as stack:
         if folder is None:
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))

@@ -5,6 +5,7 @@ A case must end in a result or a :class:`KumiteError`. Whatever else it raises i
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import itertools
 import json
@@ -37,6 +38,7 @@ from kumite.export.gltf import write_glb
 from kumite.export.sheet import recording_sheet
 from kumite.graph import (
     Library,
+    assess,
     build_action_library,
     build_library,
     build_preparation_library,
@@ -178,7 +180,13 @@ def _saved(folder: Path, name: str, save: Callable[[Path], None]) -> Path:
     return path
 
 
-_turn = itertools.count()  # deep looks cost more: only some cases get one
+_turn = itertools.count()
+_deep = True
+
+
+def _looks_deep(every: int) -> bool:
+    """Whether it is a case's turn for what costs more."""
+    return _deep and next(_turn) % every == 0
 
 
 def forged_library(rng: Rng, folder: Path) -> None:
@@ -191,7 +199,8 @@ def forged_library(rng: Rng, folder: Path) -> None:
     library = load_library(path)
     library_lines(library)
     json.dumps(library_values(library), allow_nan=False)
-    if next(_turn) % 8 == 0:
+    assess(library).rows()
+    if _looks_deep(8):
         save_library(folder / "again.kumite", library)
         assert load_library(folder / "again.kumite").digest == library.digest
         _run(library, level)
@@ -228,12 +237,11 @@ def forged_recording(rng: Rng, folder: Path) -> None:
                 struck(event), place(event)
         lines_html(log, stage.fps)
     score_html(log)
-    turn = next(_turn)
-    if turn % 8 == 0:
+    if _looks_deep(8):
         write_glb(folder / "x.glb", made)
         for name in made.names:
             write_bvh(folder / "x.bvh", made.clip(name))
-    if turn % 40 == 0:
+    if _looks_deep(20):
         recording_sheet(folder / "x.png", made, [0, len(made) - 1], size=(64, 48))
 
 
@@ -361,14 +369,11 @@ def _actions(folder: Path) -> list[bytes]:
 
 
 def _read_actions(path: Path) -> None:
-    found, library = None, libraries()["actions"]
-    for read in (read_actions, read_avoidance, read_marked):
-        try:
-            read(path, library.clips)
-        except KumiteError as error:
-            found = error
-    if found is not None:
-        raise found
+    known = libraries()["actions"].clips
+    for read in (read_marked, read_avoidance):
+        with contextlib.suppress(KumiteError):
+            read(path, known)
+    read_actions(path, known)
 
 
 def _combinations(folder: Path) -> list[bytes]:
@@ -395,9 +400,11 @@ def _read_spheres(path: Path) -> None:
     load_spheres(path, clips().skeleton)
 
 
-def prepare(target: str) -> None:
-    """What is made, trained and compiled once is not held against a case."""
-    if target == "library":
+def prepare(target: str, deep: bool) -> None:
+    """What is made, trained and compiled once is not held against a case. deep: see ``run``."""
+    global _deep
+    _deep = deep
+    if target == "library" and deep:
         for level, library in libraries().items():
             for _ in range(3):  # compiled for one and for many
                 _run(library, level)
@@ -409,7 +416,7 @@ TARGETS: dict[str, Case] = {
     "policy": forged_policy,
     "performance": forged_performance,
     "bvh": _text_case(_bvh_sources, ".bvh", _read_bvh),
-    "mocap": _text_case(_bvh_sources, ".bvh", _load_bvh),
+    "mocap": _text_case(lambda f: _bvh_sources(f)[-1:], ".bvh", _load_bvh),
     "asf": _text_case(lambda _: [ASF.encode()], ".asf", read_asf),
     "amc": _text_case(lambda _: [AMC.encode()], ".amc", _read_amc),
     "scene": _text_case(_scenes, ".toml", _read_scene),
