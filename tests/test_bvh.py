@@ -151,6 +151,12 @@ def test_layout_does_not_matter(tmp_path: Path) -> None:
         "blank lines": ARM.replace("\n", "\n\n"),
         "wrapped rows": ARM.replace("1 2 3 0", "1 2 3\n0"),
         "no last line end": ARM.rstrip("\n"),
+        "remarks": ARM.replace("JOINT mid", "JOINT mid # of the body").replace(
+            "0 2 0", "0 2 0 // y"
+        ),
+        "end in one word": ARM.replace("End Site", "EndSite"),
+        "end on two lines": ARM.replace("End Site", "End\nSite"),
+        "motion with a colon": ARM.replace("MOTION", "Motion:"),
         "comments": "# made by hand\n// twice\n"
         + ARM.replace("  JOINT mid", "  # mid\n  JOINT mid"),
         "comments in the motion": ARM.replace("\n1 2 3 90", "\n# the second\n1 2 3 90"),
@@ -267,6 +273,8 @@ def test_rates_written_with_few_digits(tmp_path: Path, written: str, fps: float)
 
 BAD = {
     "nothing": (lambda s: "", "the file is empty"),
+    "pointer": (lambda s: "version https://git-lfs.github.com/spec/v1\n", "a pointer of Git LFS"),
+    "page": (lambda s: "\n<!DOCTYPE html>\n<html>", "a web page; expected motion capture"),
     "no hierarchy": (lambda s: s[10:], ":1: unexpected 'ROOT'; expected HIERARCHY"),
     "cut in the hierarchy": (lambda s: s[:150], "expected MOTION|expected"),
     "cut in the motion": (lambda s: s[:-10], r":29: \d numbers; expected 10"),
@@ -322,6 +330,11 @@ BAD = {
         lambda s: s.replace("0.033333", "1e-" + "1" * 5000),
         "Frame Time: .*; expected a frame time from",
     ),
+    "endless digits": (
+        lambda s: s.replace("OFFSET 1 0 0", f"OFFSET {'1' * 200_000}x 0 0"),  # in no square of time
+        "'1111.*…' is not a number",
+    ),
+    "endless name": (lambda s: s.replace("mid", "m" * 5000), ":6: a name of 5000 characters"),
     "rate": (lambda s: s.replace("0.033333", "30"), "else say --file-fps 30 if this is a rate"),
     "huge count": (lambda s: s.replace("Frames: 2", "Frames: 99999999999"), "expected 99999999999"),
     "no frames": (

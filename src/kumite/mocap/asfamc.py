@@ -27,7 +27,7 @@ from kumite.clip import NO_PARENT, Skeleton
 from kumite.errors import KumiteError, at, told_of, unknown
 from kumite.kernels import parse
 from kumite.mocap import text
-from kumite.mocap.raw import MOST_JOINTS, SAY_RATE, RawMotion, Stretch, check_size
+from kumite.mocap.raw import MOST_CHARACTERS, MOST_JOINTS, SAY_RATE, RawMotion, Stretch, check_size
 
 DOFS = ("tx", "ty", "tz", "rx", "ry", "rz", "l")
 USUAL_FPS = 120.0  # of CMU's database, whose AMC files do not say
@@ -157,6 +157,9 @@ class _Asf:
     def keep(self, bone: _Bone) -> None:
         if not bone.name:
             raise self.error(bone.line, "a bone without a name")
+        if len(bone.name) > MOST_CHARACTERS:
+            what = f"a name of {len(bone.name)} characters; expected at most {MOST_CHARACTERS}"
+            raise self.error(bone.line, what)
         if bone.name in self.bones or bone.name == "root":
             raise self.error(bone.line, f"bone {text.shown(bone.name)} twice; expected it once")
         if len(self.bones) == MOST_JOINTS:

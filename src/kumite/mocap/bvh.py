@@ -19,7 +19,7 @@ from kumite.clip import NO_PARENT, Skeleton
 from kumite.errors import KumiteError, at, told_of
 from kumite.kernels import parse
 from kumite.mocap import text
-from kumite.mocap.raw import MOST_JOINTS, SAY_RATE, RawMotion, check_size
+from kumite.mocap.raw import MOST_CHARACTERS, MOST_JOINTS, SAY_RATE, RawMotion, check_size
 
 POSITION_CHANNELS = ("Xposition", "Yposition", "Zposition")
 ROTATION_CHANNELS = ("Xrotation", "Yrotation", "Zrotation")
@@ -28,8 +28,9 @@ _KEYWORDS = "ROOT, JOINT, End Site, OFFSET, CHANNELS, { or }"
 _LONGEST_FRAME = 1.0  # s; beyond it a frame time is a rate, or in another unit
 _SHORTEST_FRAME = 1e-5  # s
 _STILL = 2e-5  # of the longest bone: a position channel that differs less from its OFFSET is it
-_MOTION = re.compile(rb"^[ \t]*(?:\}[ \t]*)*(MOTION)(?![^\s{}])", re.MULTILINE | re.IGNORECASE)
+_MOTION = re.compile(rb"^[ \t]*(?:\}[ \t]*)*(MOTION):?(?![^\s{}])", re.MULTILINE | re.IGNORECASE)
 _COMMENT = re.compile(rb"^[ \t]*(?:#|//)[^\n]*", re.MULTILINE)
+_REMARK = re.compile(r"\s(?:#|//).*")  # behind a statement; a name may hold a '#'
 _FRAMES = re.compile(rb"\s*Frames[ \t]*:?\s*([^\s:]+)", re.IGNORECASE)
 _FRAME_TIME = re.compile(rb"\s*Frame[ \t]*Time[ \t]*:?[ \t]*(\S*)", re.IGNORECASE)
 
@@ -86,7 +87,7 @@ class _Hierarchy:
         self.todo: deque[tuple[int, str]] = deque(
             (n, part.strip())
             for n, line in enumerate(header.split("\n"), 1)
-            for part in re.split(r"([{}])", line)
+            for part in re.split(r"([{}])", _REMARK.sub("", line))
             if part.strip()
         )
         self.joints: list[_Joint] = []
@@ -118,6 +119,10 @@ class _Hierarchy:
     def statement(self, line: int, word: str, statement: str, rest: str) -> str:
         """Take one statement in; returns what is left of it for the next."""
         key = word.upper()
+        if key == "ENDSITE":
+            key, rest = "END", "Site"
+        elif key == "END" and not rest and self.todo and self.todo[0][1].upper() == "SITE":
+            rest = self.todo.popleft()[1]
         if self.opens_next is not None:
             if statement != "{":
                 raise self.error(line, f"unexpected {text.shown(statement)}; expected '{{'")
@@ -158,6 +163,9 @@ class _Hierarchy:
     def joint(self, line: int, name: str, parent: int) -> None:
         if not name:
             raise self.error(line, "a joint without a name")
+        if len(name) > MOST_CHARACTERS:
+            what = f"a name of {len(name)} characters; expected at most {MOST_CHARACTERS}"
+            raise self.error(line, what)
         if len(self.joints) == MOST_JOINTS:
             raise self.error(line, f"more than {MOST_JOINTS} joints; expected those of a person")
         self.opens_next = _Joint(name, parent, len(self.joints))

@@ -13,6 +13,7 @@ from kumite.clip import Clip, Skeleton
 from kumite.errors import KumiteError
 
 MOST_JOINTS = 2000  # of a skeleton: a person with fingers and face has some 300
+MOST_CHARACTERS = 200  # of a joint's name
 MOST_POSES = 100_000_000  # frames times joints of a take, 3 GB: four hours of 60 joints at 120 Hz
 _X, _Z, _QUARTER = [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], 0.5 * np.pi
 # The turn that carries each axis to +Y. About X, so that left stays left; a character that faces

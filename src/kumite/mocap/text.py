@@ -15,8 +15,13 @@ from kumite.errors import KumiteError, at
 from kumite.kernels import parse
 
 LARGEST = 1e9  # a length or angle beyond this is damage, and its square would overflow further on
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+_NOT_MOTION = {  # what downloads leave in a file's place
+    b"version https://git-lfs": "a pointer of Git LFS, not the file itself (git lfs pull)",
+    b"<!doctype": "a web page",
+    b"<html": "a web page",
+}
 _ENCODING = "say --encoding, or encoding in kumite.toml"
 _SHOWN = 40  # characters of a bad token that an error repeats
 
@@ -48,6 +53,9 @@ def read_text(path: Path, encoding: str | None = None) -> tuple[bytes, tuple[str
     data = data.removeprefix(codecs.BOM_UTF8)
     if b"\0" in data[:4096]:
         raise KumiteError(f"{path}: not a plain text file; expected text, such as UTF-8")
+    for start, what in _NOT_MOTION.items():
+        if data[:200].lstrip().lower().startswith(start):
+            raise KumiteError(f"{path}: {what}; expected motion capture")
     if data.isascii():
         return _line_ends(data), ()
     try:
