@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from kumite import mocap as mocap_files
 from kumite.clip import Clip, concatenate, forward_kinematics
 from kumite.errors import KumiteError
 from kumite.graph import (
@@ -19,7 +20,9 @@ from kumite.graph import (
     build_action_library,
     build_avoidance_library,
     build_library,
+    builtin_library,
 )
+from kumite.graph.assess import SOON, ways_out_soon
 from kumite.rotation import angle, from_axis_angle, multiply
 from tests import toys
 
@@ -120,7 +123,7 @@ def test_build_ends_with_what_the_library_is_worth(run, tmp_path: Path):
     run("perform", "boxing", "-o", "takes")
     status, out, _ = run("build", "takes/jab.bvh", "-o", "jab.kumite", "--join-height", "0.1")
     assert status == 0
-    for word in ("frames in the graph", "fight by policy", "pelvis height", "thin, because"):
+    for word in ("frames in the graph", "fight by policy", "pelvis height", "will not, because"):
         assert word in out, word
     status, out, _ = run("build", "takes/jab.bvh", "-o", "jab.kumite", "--json")
     worth = json.loads(out)["worth"]
@@ -130,3 +133,32 @@ def test_build_ends_with_what_the_library_is_worth(run, tmp_path: Path):
     }  # fmt: skip
     status, out, err = run("build", "takes/jab.bvh", "-o", "x.kumite", "--join-angle", "0")
     assert status == 2 and "angle 0" in err and not Path("x.kumite").exists()
+
+
+def test_verdicts_on_people_are_those_of_the_scenes(boxer: Library, mocap: Path):
+    """What was seen: the boxer lands blows; of 80 balls he avoids 27, as few ways out are near;
+    who runs and kicks now and then has blows, but throws none in 40 s of sparring."""
+    assert assess(boxer).verdict("fight by policy").word == "will work"
+    dodger = build_avoidance_library(boxer.clips)
+    assert assess(dodger).verdict("avoid").word == "thin"
+    runner = build_library(mocap_files.load(mocap / "cmu" / "127").clip_set())
+    found = assess(runner).verdict("fight by policy")
+    assert found.word == "thin" and "from where one stands" in found.why
+
+
+def test_ways_out_that_are_soon_equal_a_count_by_hand():
+    dodgers = builtin_library(None, style="avoidance", level="avoidance")
+    table, fps = dodgers.table, dodgers.clips.fps
+    begin, part = dodgers.parts_of_stretch
+    total, time = 0.0, 0
+    for state in range(table.states):
+        ways = {
+            int(p)
+            for a in table.stretch[table.actions_of(state)]
+            for p in part[begin[a] : begin[a + 1]]
+            if dodgers.avoidance.centre[p] - table.first[a] + 1 <= SOON * fps
+        }
+        here = int(table.duration[table.target == state].sum())
+        total, time = total + len(ways) * here, time + here
+    assert ways_out_soon(dodgers) == pytest.approx(total / time)
+    assert assess(dodgers).verdict("avoid").word == "will work"

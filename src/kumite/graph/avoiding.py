@@ -157,12 +157,12 @@ def find_avoiding_transitions(
     d[near & (clip[changing][:, None] == clip[onward][None])] = np.inf
     for row, i in enumerate(changing):
         left = ELSEWHERE
-        for j in np.argsort(d[row], kind="stable")[: 16 * ELSEWHERE].tolist():
+        for j in np.argsort(d[row], kind="stable").tolist():
             enough = left < ELSEWHERE and d[row, j] > worst
             if left == 0 or not np.isfinite(d[row, j]) or enough:
                 break
             taken = [t for s, t in zip(source[-ELSEWHERE:], target[-ELSEWHERE:]) if s == i]
-            if any(abs(t - onward[j]) < fps for t in taken):
+            if any(abs(t - onward[j]) < fps and clip[t] == clip[onward[j]] for t in taken):
                 continue
             source.append(int(i))
             target.append(int(onward[j]) + 1)
