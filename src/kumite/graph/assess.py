@@ -26,7 +26,8 @@ LONG = 1.8  # s
 FEW_STATES = 20  # from so few places in the clips there is little choice
 FEW_ATTACKS, FEW_OTHERS = 8, 12  # actions of whole-action fights: attacks; defences and steps
 SOON = 0.8  # s in which an avoidance must be under way to be in time
-# Avoidances so soon, on average: with 6 to 9 three balls of four are avoided, with 2 to 3 one or two.
+# Avoidances so soon, on average: with 6 to 9 three balls of four are avoided, with 2 to 3 one of
+# three.
 FEW_WAYS = 4.0
 FEW_TARGETS, FEW_CORES = 3, 3
 
