@@ -35,6 +35,7 @@ from kumite.control.policy import BEHAVIOURS
 from kumite.errors import KumiteError
 from kumite.export.bvh import write_bvh
 from kumite.export.gltf import write_glb
+from kumite.export.moments import moments
 from kumite.export.sheet import recording_sheet
 from kumite.graph import (
     Library,
@@ -60,6 +61,7 @@ from kumite.scene import (
 )
 from kumite.scene import recording as recordings
 from kumite.scene.recording import Recording
+from kumite.scene.reports import reports
 from kumite.studio.wording import EventLog, describe, lines_html, place, score_html, struck
 from tests.fuzz import mutate
 from tests.test_asfamc import AMC, ASF
@@ -100,7 +102,7 @@ def fight() -> Recording:
     """Two who spar, with a ball and an event of every kind that is told."""
     scene = LiveScene(load_scene("sparring"), libraries()["frames"], seed=1)
     made = record(scene, 2.0)
-    at = {"place": [0.1, 1.4, 0.2], "speed": 6.5}
+    at = {"place": [0.1, 1.4, 0.2], "speed": 6.5, "time": 0.5}
     more = [
         ("hit", {"victim": "blue", "limb": "left_hand", "part": "head", "blocked": True, **at}),
         ("throw", {"attack": 1, "ball": "ball 1", **at}),
@@ -125,17 +127,17 @@ def fight() -> Recording:
     frames = len(made)
     return replace(
         made,
-        objects=("ball", "car"),
-        object_position=np.full((frames, 2, 3), 0.5, np.float32),
+        objects=("ball 1", "car", "beam"),
+        object_position=np.full((frames, 3, 3), 0.5, np.float32),
         rate=np.ones((frames, 2), np.float32),
         events=(*made.events, *events),
         settings={
             **made.settings,
-            "object_radius": {"ball": 0.1},
+            "object_radius": {"ball 1": 0.1},
             "object_size": {"car": [1.7, 1.4, 4.0]},
             "object_yaw": {"car": 0.5},
             "object_wheels": ["car"],
-            "object_thrown": ["ball"],
+            "object_thrown": ["ball 1"],
             "unarmed": ["blue"],
         },
     )
@@ -227,6 +229,10 @@ def forged_recording(rng: Rng, folder: Path) -> None:
     _forge(rng, path, good, recordings.KIND, recordings.VERSION)
     made = load_recording(path)
     json.dumps(measure(made).to_json(), allow_nan=False)
+    for report in reports(made):
+        json.dumps([report.rows, report.columns, report.total], allow_nan=False)
+    for moment in moments(made):
+        assert 0 <= moment.frame < len(made)
     stage = Playback(made)
     log = EventLog(made.names, dodging=True, preparing=True)
     log.show_quiet = True

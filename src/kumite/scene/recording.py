@@ -15,7 +15,7 @@ import numpy as np
 from kumite import checks, files
 from kumite.clip import Clip, Skeleton
 from kumite.errors import KumiteError, unknown
-from kumite.scene.told import check_event, check_settings
+from kumite.scene.told import check_event, check_settings, check_whole
 
 KIND = "recording"
 VERSION = 2
@@ -189,7 +189,7 @@ def load_recording(path: Path | str) -> Recording:
             skeleton=skeleton_from_header(header["skeleton"]),
             names=header["names"],
             objects=header["objects"],
-            events=events_from_header(header["events"]),
+            events=_events(header["events"], tuple(header["objects"])),
             settings=header["settings"],
             **arrays,
         )
@@ -197,5 +197,8 @@ def load_recording(path: Path | str) -> Recording:
         raise KumiteError(f"{path}: damaged recording ({error})") from None
 
 
-def events_from_header(rows: Sequence[Sequence[Any]]) -> tuple[Event, ...]:
-    return tuple(Event(f, k, c, d) for f, k, c, d in rows)
+def _events(rows: Sequence[Sequence[Any]], objects: tuple[str, ...]) -> tuple[Event, ...]:
+    events = tuple(Event(f, k, c, d) for f, k, c, d in rows)
+    for event in events:
+        check_whole(event.kind, event.data, objects)
+    return events

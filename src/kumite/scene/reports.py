@@ -101,7 +101,8 @@ def _throws(recording: Recording, events: Events) -> Report | None:
     if "throw" not in events:
         return None
     ways_out = found_ways_out(events["avoidance"])
-    end = {e.data["attack"]: e for kind in ("avoided", "missed", "struck") for e in events[kind]}
+    ends = [e for kind in ("avoided", "missed", "struck") for e in events[kind]]
+    end = {e.data["attack"]: e for e in ends if "attack" in e.data}  # not missed check points
     rows = {}
     for name in recording.names:
         thrown = [e.data["attack"] for e in _of(events["throw"], name)]
@@ -147,7 +148,7 @@ def _blows_avoided(recording: Recording, events: Events) -> Report | None:
             continue
         missed = [e.data["attack"] for e in _of(events["avoided"], name)]
         escaped = {a for a in missed if (a, name) in ways_out}
-        lucky = [a for a in missed if a not in escaped and gap[a] < 0.0]
+        lucky = [a for a in missed if a not in escaped and gap.get(a, np.inf) < 0.0]
         met = [e for e in _where(events["hit"], victim=name) if e.data.get("attack") in coming]
         rows[name] = {
             "blows": len(coming),

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from kumite.checks import array, instance, mapping, names, number, text, whole
+from kumite.checks import array, instance, mapping, names, number, shown, text, whole
 from kumite.errors import KumiteError
 
 Check = Callable[[Any, str], object]
@@ -74,8 +74,34 @@ SEARCH: dict[str, Check] = {
 SAID: dict[str, dict[str, Check]] = {
     "strike": BLOW,
     "hit": BLOW,
-    "decision": {"stretch": whole, "state": whole, "worth": number},
-    "reaction": {"deviation": _or_none(number), "impulse": number, "physical": _flag},
+    "decision": {
+        "stretch": whole,
+        "state": whole,
+        "worth": number,
+        "action": text,
+        "nodes": whole,
+        "considered": whole,
+        "pruned": number,
+        "comp": number,
+        "coop": number,
+    },
+    "reaction": {
+        "deviation": _or_none(number),
+        "impulse": number,
+        "physical": _flag,
+        "size": text,
+        "action": text,
+    },
+    "run over": {"by": text, "speed": number},
+    "foreseen": {
+        "attack": whole,
+        "limb": text,
+        "blow": whole,
+        "at": text,
+        "gap": number,
+        "begins": number,
+    },
+    "counter": {"victim": text, "limb": text, "blow": whole, "gap": number, "seconds": number},
     "throw": BALL,
     "struck": BALL,
     "avoided": BALL,
@@ -92,8 +118,29 @@ SAID: dict[str, dict[str, Check]] = {
     "check point": {"point": whole, "late_by": number, "distance": number},
 }
 """What an event of a kind may say, and what must stand there. Other names hold any plain value."""
-NEEDED = {"avoidance": ("attack", "outcome")}
-"""What an event of a kind must say."""
+NEEDED = {
+    "strike": ("limb",),
+    "hit": ("victim", "limb", "part", "speed", "place", "time"),
+    "throw": ("attack", "ball"),
+    "struck": ("attack", "part", "speed", "place"),
+    "avoided": ("attack",),
+    "avoidance": ("attack", "outcome"),
+    "foreseen": ("attack", "at", "gap"),
+    "launch": ("motion", "level", "apart_deg"),
+    "passed": ("thing", "clearance"),
+    "touched": ("thing", "part"),
+    "check point": ("point", "late_by", "distance"),
+}
+"""What an event of a kind in a file must say."""
+THINGS = ("ball", "thing")
+"""Names under which an event names one of the objects."""
+
+
+def _scene(value: Any, what: str) -> None:
+    bout = mapping(value, what).get("bout")
+    if bout is not None:
+        mapping(bout, f"{what}: bout")
+
 
 SETTINGS: dict[str, Check] = {
     "seed": whole,
@@ -107,6 +154,7 @@ SETTINGS: dict[str, Check] = {
     "object_wheels": _names,
     "aims_at": _by_name(_or_none(text)),
     "unarmed": _names,
+    "scene": _scene,
 }
 """What a recording may say of how it was made."""
 
@@ -121,9 +169,18 @@ def check_event(kind: Any, data: Any) -> None:
             said[name](value, f"event {kind!r}: {name}")
         elif not isinstance(name, str):
             text(name, f"event {kind!r}: a key")
+    if "nodes" in data and "pruned" not in data and kind == "decision":
+        raise KumiteError(f"event {kind!r}: pruned is missing")
+
+
+def check_whole(kind: str, data: Mapping[str, Any], objects: tuple[str, ...]) -> None:
+    """Errors: data that lack what readers of a file look for; an object that is none."""
     for name in NEEDED.get(kind, ()):
         if name not in data:
             raise KumiteError(f"event {kind!r}: {name} is missing")
+    for name in THINGS:
+        if name in data and name in SAID.get(kind, {}) and data[name] not in objects:
+            raise KumiteError(f"event {kind!r}: {shown(data[name])} is none of the objects")
 
 
 def check_settings(settings: Any) -> None:
