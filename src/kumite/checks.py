@@ -23,7 +23,7 @@ FAR = 1e9  # m, or units of a file: nobody and nothing is farther away
 UNIT_WITHIN = 1e-3  # by which a quaternion's length may differ from 1
 LONGEST_NAME = 1000  # characters
 LEAST_FPS, MOST_FPS = 0.001, 100_000.0  # frames a second
-_KINDS = {"f": "biuf", "i": "iu", "u": "iu", "b": "biuf"}  # of NumPy, that each may be made of
+_KINDS = {"f": "biuf", "i": "iuf", "u": "iuf", "b": "biuf"}  # of NumPy, that each may be made of
 _CALLED = {"f": "numbers", "i": "whole numbers", "u": "whole numbers", "b": "true or false"}
 
 
@@ -179,6 +179,10 @@ def array(
         if low < limits.min or high > limits.max:
             wrong = low if low < limits.min else high
             raise KumiteError(f"{what}: {wrong}; expected {limits.min} to {limits.max}")
+    if wanted.kind in "iu" and found.dtype.kind == "f":
+        odd = ~(np.isfinite(found) & (found == np.floor(found)))
+        if odd.any():
+            raise KumiteError(f"{what}: {found[odd].flat[0]}; expected whole numbers")
     if wanted.kind == "b" and found.dtype.kind != "b" and not np.isin(found, (0, 1)).all():
         raise KumiteError(f"{what}: expected true or false, or 1 and 0")
     with np.errstate(over="ignore", invalid="ignore"):
