@@ -84,10 +84,11 @@ class _Hierarchy:
         self.path = path
         self.last_line = header.count("\n") + 1
         # Braces stand alone, whatever line they are on.
+        remarks = "#" in header or "//" in header
         self.todo: deque[tuple[int, str]] = deque(
             (n, part.strip())
             for n, line in enumerate(header.split("\n"), 1)
-            for part in re.split(r"([{}])", _REMARK.sub("", line))
+            for part in re.split(r"([{}])", _REMARK.sub("", line) if remarks else line)
             if part.strip()
         )
         self.joints: list[_Joint] = []

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import glob
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -227,13 +227,14 @@ def load(
             takes.append(_read(path, said[path], given, roles or {}, skeletons))
         except KumiteError as error:
             bad[path] = str(error)
+    clip_names = _unique_names(takes, names or {}, [p for p, _ in files])
     clips: dict[Path, Clip] = {}
     info: dict[Path, ClipInfo] = {}
     for session in _sessions(takes):
         for take, scale, up, floor in _inferred(session, given, bad):
             clip = to_clip(
                 take.raw,
-                take.path.stem,
+                clip_names[take.path],
                 metres_per_unit=scale,
                 up_axis=up,
                 ground_height=floor,
@@ -249,7 +250,7 @@ def load(
                 bad[take.path] = str(error)
                 continue
             info[take.path] = ClipInfo(
-                take.path.stem,
+                clip_names[take.path],
                 take.path,
                 take.raw.skeleton_source,
                 len(take.raw),
@@ -263,13 +264,8 @@ def load(
     bad_files = tuple(BadFile(p, bad[p]) for p, _ in files if p in bad)
     if bad_files and not (skip_bad and clips):
         _raise(bad_files, some_good=bool(clips))
-    good = [t for t in takes if t.path in clips]
-    clip_names = _unique_names(good, names or {}, [p for p, _ in files])
-    return Loaded(
-        tuple(replace(clips[t.path], name=clip_names[t.path]) for t in good),
-        tuple(replace(info[t.path], name=clip_names[t.path]) for t in good),
-        bad_files,
-    )
+    good = [t.path for t in takes if t.path in clips]
+    return Loaded(tuple(clips[p] for p in good), tuple(info[p] for p in good), bad_files)
 
 
 def _raise(bad: Sequence[BadFile], *, some_good: bool) -> None:

@@ -9,6 +9,7 @@ and a head by their symmetry.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import re
 from collections import Counter
@@ -122,6 +123,7 @@ def _listed(names: list[str]) -> str:
 # Names -------------------------------------------------------------------------------------------
 
 
+@functools.lru_cache(maxsize=4096)
 def split_name(name: str) -> tuple[str, str | None]:
     """A joint's part and side: ``mixamorig:LeftForeArm`` is ``('forearm', 'left')``."""
     words = [w for w in _words(name) if w not in _EMPTY_WORDS]
@@ -147,14 +149,15 @@ def _words(name: str) -> list[str]:
     return [w for w in words if not w.isdigit()]
 
 
-def _without_prefix(names: tuple[str, ...]) -> list[str]:
+@functools.lru_cache(maxsize=64)
+def _without_prefix(names: tuple[str, ...]) -> tuple[str, ...]:
     """Names without the words that nearly all of them begin with: ``CC_Base_``, ``Robot_``."""
     bare = [re.split(r"[:|]", n)[-1] for n in names]
     while True:
         first = Counter(w[0] for w in map(_words, bare) if len(w) > 1)
         word, count = first.most_common(1)[0] if first else ("", 0)
         if count < _NEARLY_ALL * len(names) or word in _SIDE_WORDS:
-            return bare
+            return tuple(bare)
         bare = [_behind(word, n) for n in bare]
 
 

@@ -28,14 +28,9 @@ _AT_REST = 0.1  # rad: mean turn of the joints in the rest pose
 
 def without_apart(clip: Clip) -> tuple[Clip, list[str]]:
     """The clip without frames that stand apart at its ends, and what was left out."""
-    if len(clip) <= _FEW + _NEXT:
+    if len(clip) <= _FEW + _NEXT or not _may_stand_apart(clip):
         return clip, []
-    position, _ = forward_kinematics(clip.skeleton, clip.root_position, clip.wxyz)
-    parts = [clip.skeleton.joint(r) for r in _PARTS]
-    step = np.linalg.norm(np.diff(position[:, parts], axis=0), axis=2).max(axis=1)
-    if not np.any((step >= _FAR) & (step * clip.fps >= _FAST_FROM_T)):
-        return clip, []
-    posed = _posed(clip, position)
+    step, posed = _looked_at(clip, slice(None))
     first = _apart(step, posed, clip.fps)
     last = _apart(step[::-1], posed[::-1], clip.fps)
     if len(clip) - first - last < 2 or first + last == 0:
@@ -55,6 +50,24 @@ def without_apart(clip: Clip) -> tuple[Clip, list[str]]:
         replace(clip, root_position=clip.root_position[first:stop], wxyz=clip.wxyz[first:stop]),
         notes,
     )
+
+
+def _may_stand_apart(clip: Clip) -> bool:
+    """Whether a clip begins or ends in a pose, or with a snap: few do, and few frames tell."""
+    for some in (slice(None, _FEW + 2), slice(-_FEW - 2, None)):
+        step, posed = _looked_at(clip, some)
+        if posed[0 if some.start is None else -1] or np.any(step >= _FAR):
+            return True
+    return False
+
+
+def _looked_at(clip: Clip, frames: slice) -> tuple[np.ndarray, np.ndarray]:
+    """How far the body goes to the next frame [F - 1] m, and whether it is in a pose [F]."""
+    wxyz = clip.wxyz[frames]
+    position, _ = forward_kinematics(clip.skeleton, clip.root_position[frames], wxyz)
+    parts = [clip.skeleton.joint(r) for r in _PARTS]
+    step = np.linalg.norm(np.diff(position[:, parts], axis=0), axis=2).max(axis=1)
+    return step, _posed(clip, position, wxyz)
 
 
 _PARTS = ("pelvis", "head", *(f"{s}_{p}" for s in SIDES for p in ("hand", "foot")))
@@ -78,19 +91,19 @@ def _apart(step: np.ndarray, posed: np.ndarray, fps: float) -> int:
     return 0
 
 
-def _posed(clip: Clip, position: np.ndarray) -> np.ndarray:
+def _posed(clip: Clip, position: np.ndarray, wxyz: np.ndarray) -> np.ndarray:
     """Whether each frame [F] is the rest pose, or has both arms stretched out to the sides."""
     joint = clip.skeleton.joint
     shoulders = {s: position[:, joint(f"{s}_upper_arm")] for s in SIDES}
     across = _unit(shoulders["left"] - shoulders["right"])
-    out = np.ones(len(clip), dtype=bool)
+    out = np.ones(len(position), dtype=bool)
     for side, sign in zip(SIDES, (1.0, -1.0)):
         elbow, wrist = (position[:, joint(f"{side}_{p}")] for p in ("forearm", "hand"))
         upper, lower = _unit(elbow - shoulders[side]), _unit(wrist - elbow)
         out &= (np.sum(upper * lower, axis=1) > _STRAIGHT) & (
             sign * np.sum(_unit(wrist - shoulders[side]) * across, axis=1) > _OUT
         )
-    turned = rotation.angle(clip.wxyz[:, 1:], rotation.IDENTITY_WXYZ).mean(axis=1)
+    turned = rotation.angle(wxyz[:, 1:], rotation.IDENTITY_WXYZ).mean(axis=1)
     return out | (turned < _AT_REST)
 
 
