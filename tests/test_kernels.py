@@ -137,7 +137,7 @@ def test_crowds_are_shown_by_what_is_compiled_first(tmp_path: Path):
         "from kumite.graph import builtin_library; from kumite.kernels import character\n"
         "from kumite.synthesis import Cast\n"
         "cast = Cast(builtin_library(None), character.MANY)\n"
-        "cast.show(0.0); print(character._show_many.signatures != [])"
+        "cast.show(0.0); print(character.show_many.signatures != [])"
     )
     environment = {
         **os.environ,

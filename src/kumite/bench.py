@@ -20,13 +20,14 @@ from typing import Any
 import numpy as np
 
 from kumite.bench_avoidance import avoidance_figures
+from kumite.bench_compile import Value, compile_figures
 from kumite.bench_preparation import preparation_figures
 from kumite.errors import KumiteError
 
 REPEATS = 3
 SPARRING_SEEDS = range(5)
 SPARRING_SECONDS = 60.0
-_FIGURES: dict[str, tuple[Callable[[Path], float], str, float | None]] = {}
+_FIGURES: dict[str, tuple[Callable[[Path], Value], str, float | None]] = {}
 
 
 def _figure(name: str, unit: str, limit: float | None = None):
@@ -443,6 +444,7 @@ def _looked_at(folder: Path) -> float:
 
 _FIGURES |= preparation_figures(_best)
 _FIGURES |= avoidance_figures(_best)
+_FIGURES |= compile_figures()
 
 
 @_figure("kumite build from nothing compiled", "s", 90.0)
@@ -495,18 +497,19 @@ def run_all(
             )
             if done.returncode:
                 raise KumiteError(f"{name}: {done.stderr.strip().splitlines()[-1]}")
-            row = json.loads(done.stdout.splitlines()[-1])
-            if np.isfinite(row["value"]):
-                rows.append(row)
+            found = json.loads(done.stdout.splitlines()[-1])
+            rows += [row for row in found if np.isfinite(row["value"])]
     return rows
 
 
 def _main(name: str, folder: str) -> None:
     function, unit, limit = _FIGURES[name]
     value = function(Path(folder))
-    peak = _peak_mb(children=function is _cold)
-    row = {"name": name, "value": value, "unit": unit, "limit": limit, "peak_mb": peak}
-    print(json.dumps(row))
+    peak = _peak_mb(children=function is _cold or name in compile_figures())
+    told = {"unit": unit, "limit": limit, "peak_mb": peak}
+    values = value if isinstance(value, dict) else {"": value}
+    rows = [{"name": f"{name}: {n}" if n else name, "value": v, **told} for n, v in values.items()]
+    print(json.dumps(rows))
 
 
 def _peak_mb(children: bool) -> float | None:

@@ -163,6 +163,19 @@ class Stages:
             self._bars.update(self._number, stage=stage)
 
 
+class Compiling:
+    """A bar of what is compiled, where something is."""
+
+    def __init__(self, bars: Bars) -> None:
+        self._bars = bars
+        self._number: int | None = None
+
+    def __call__(self, done: int, total: int) -> None:
+        if self._number is None:
+            self._number = self._bars.add("compiling, only this once", total=total)
+        self._bars.update(self._number, done, note=f"{done} of {total}")
+
+
 class Training:
     """A bar a policy: how far the residual has come, in powers of ten."""
 

@@ -16,7 +16,7 @@ from rich.table import Table
 from kumite.cli.app import INTERRUPTED, JsonOption, app, err, out, print_json
 from kumite.cli.complete import complete_scene, complete_shown
 from kumite.cli.library import is_library
-from kumite.cli.progress import Stages, Training, progress, say
+from kumite.cli.progress import Compiling, Stages, Training, progress, say
 from kumite.cli.report import show_metrics
 from kumite.errors import KumiteError, unknown
 from kumite.scene import catalogue
@@ -80,9 +80,11 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
     from kumite.graph import builtin_library, load_library
     from kumite.scene import BoutScene, DodgeScene, EvasionScene, LiveScene, PrepareScene
     from kumite.scene.needs import needs
+    from kumite.warm import warm
 
     cache, needed = cache_folder(library), needs(settings)
     with progress() as bars:
+        warm([settings], Compiling(bars), building=library is None)
         stages = Stages(bars)
         if library is not None:
             stages("reading the library")

@@ -205,7 +205,8 @@ def packed(
     if len(taken) == 1:
         when, lasts, centre, radius = taken[0]
         sample = np.array([0, len(when)])
-        return Attacks(sample, when, lasts, centre, radius[None], np.array([len(radius)])), which
+        radii, count = radius[None].copy(), np.array([len(radius)])  # may be written to, as below
+        return Attacks(sample, when, lasts, centre, radii, count), which
     most = max((len(t[3]) for t in taken), default=1)
     sample = np.cumsum([0, *(len(t[0]) for t in taken)])
     centre, radius = np.zeros((sample[-1], most, 3)), np.zeros((len(taken), most))

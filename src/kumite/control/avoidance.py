@@ -179,7 +179,8 @@ class AvoidanceSearch:
             )
         table, s = library.table, self.settings
         speed = fastest_end_effector(library)
-        begins, ends = parts.start[which], parts.stop[which] - 1
+        begins = parts.start[which].astype(np.int64)  # of built and of read libraries the same type
+        ends = parts.stop[which].astype(np.int64) - 1
         self.which = which  # [A] part of the library for each part of an edge
         middle = 0.5 * (begins + ends)
         soonest = np.empty(table.states)

@@ -19,7 +19,8 @@ def first_met(p0, p1, radius, a0, a1, b0, b1, radius_a, radius_b, root, spared, 
     """
     for s in range(p0.shape[0]):
         who[s], part[s], when[s] = NO_HIT, NO_HIT, 2.0
-        step = np.sqrt(np.sum((p1[s] - p0[s]) ** 2))
+        dx, dy, dz = p1[s, 0] - p0[s, 0], p1[s, 1] - p0[s, 1], p1[s, 2] - p0[s, 2]
+        step = np.sqrt(dx * dx + dy * dy + dz * dz)
         for k in range(root.shape[0]):
             if k == spared[s]:
                 continue

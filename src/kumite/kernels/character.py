@@ -223,7 +223,9 @@ def join_at(k, frame_from, frame_to, now, then, anchor, capture, offsets):
     not depend on how fast it is gone.
     """
     here = anchor[k]
-    before = here.copy()
+    before = np.empty(3)
+    for c in range(3):
+        before[c] = here[c]
     align(before, capture.facing[frame_from], capture.facing[frame_to], here)
     joints = capture.wxyz.shape[1]
     # Of the source and of the target each: a shown frame before, and now.
@@ -239,8 +241,8 @@ def join_at(k, frame_from, frame_to, now, then, anchor, capture, offsets):
             anchored_root(before, places[1, 0], turns[1, 0], p_from, turn)
             anchored_root(here, places[3, 0], turns[3, 0], p_to, base)
         else:
-            turn[:] = turns[1, j]
-            base[:] = turns[3, j]
+            for c in range(4):
+                turn[c], base[c] = turns[1, j, c], turns[3, j, c]
         quaternion_product(turn, held, shown)
         difference(base, shown, offsets.joint[k, j])
         difference(turns[0, j], turns[1, j], v)
@@ -302,7 +304,8 @@ def adopt(k, frame, rate, anchor, shown, moving, ankles, stepping, capture, offs
     anchored_root(here, places[1, 0], turns[1, 0], place, base)
     for j in range(joints):
         if j > 0:
-            base[:] = turns[1, j]
+            for c in range(4):
+                base[c] = turns[1, j, c]
         turn = offsets.joint[k, j]
         difference(base, shown[1 + j], turn)
         difference(turns[0, j], turns[1, j], v)

@@ -122,7 +122,8 @@ def decide_one(k, state, place, grid, actors, minds, moves, behaviours, horizon,
     here[0], here[1] = planar_point(actors.anchor[k], actors.facing[f, 0], actors.facing[f, 1])
     here[2] = actors.anchor[k, 2] + actors.facing[f, 2]
     target = np.empty((horizon, 4))
-    others = np.full((NEIGHBOURS, horizon, 2), FAR)
+    others = np.empty((NEIGHBOURS, horizon, 2))
+    others[:] = FAR
     foresee(k, here, actors, target, others[0])
     count = 1
     if place.shape[0] > 2:
@@ -155,19 +156,55 @@ def give_way(k, actors, minds, choices):
 
 
 @kernel
+def best_left(values, allowed, taken, count):
+    """The largest of the allowed values [n] that is not among taken[:count], or -1."""
+    top = -1
+    for n in range(values.shape[0]):
+        if not allowed[n] or (top >= 0 and values[n] <= values[top]):
+            continue
+        free = True
+        for i in range(count):
+            free = free and taken[i] != n
+        if free:
+            top = n
+    return top
+
+
+@kernel
+def median_of(values, allowed):
+    """The median of the allowed values, of which there is one at least."""
+    line, count = np.empty(values.shape[0]), 0
+    for n in range(values.shape[0]):
+        if not allowed[n]:
+            continue
+        at = count
+        while at > 0 and line[at - 1] > values[n]:
+            line[at] = line[at - 1]
+            at -= 1
+        line[at] = values[n]
+        count += 1
+    half = count >> 1
+    return line[half] if count & 1 else (line[half - 1] + line[half]) / 2
+
+
+@kernel
 def weigh_again(many, state, target, allowed, moves, behaviours, weights, facing, worth):
     """The best ``many`` of the allowed actions are weighed by two backups: worth [n], in place.
 
     Only they are allowed from then on: what is weighed otherwise cannot be compared with them.
     """
     begin, done = moves.action_start[state], 0
-    for n in np.argsort(-worth):
-        if allowed[n] and done < many:
-            k = moves.stretch[begin + n]
-            worth[n] = look_further(k, target, moves, behaviours, weights, facing)
-            done += 1
-        else:
-            allowed[n] = False
+    best = np.empty(many, dtype=np.int64)
+    while done < many:
+        best[done] = best_left(worth, allowed, best, done)
+        if best[done] < 0:
+            break
+        done += 1
+    allowed[:] = False
+    for i in range(done):
+        n = best[i]
+        worth[n] = look_further(begin + n, target, moves, behaviours, weights, facing)
+        allowed[n] = True
 
 
 @kernel
@@ -200,17 +237,19 @@ def pick(k, state, target, others, minds, moves, behaviours, choices):
         widest = max(widest, gap[n])
     # Where every action would come too near, those that stay farthest off.
     least = space if apart else widest - 0.02
-    allowed = gap >= least
+    allowed = np.empty(count, dtype=np.bool_)
+    for n in range(count):
+        allowed[n] = gap[n] >= least
     # What counts is how much better an action is than the usual one: far from the target all are
     # worth nearly the same, and still one of them leads there.
-    usual = np.median(worth[allowed])
+    usual = median_of(worth, allowed)
     if temper[AGAIN] > 1.0:
         many = int(temper[AGAIN])
         weigh_again(many, state, target, allowed, moves, behaviours, weights, facing, worth)
-    gain = worth - usual
+    gain = np.empty(count)
     for n in range(count):
+        gain[n] = worth[n] - usual if allowed[n] else -np.inf
         if not allowed[n]:
-            gain[n] = -np.inf
             continue
         for m in range(minds.recent.shape[1]):
             if minds.recent[k, m] == moves.stretch[begin + n]:
@@ -222,14 +261,7 @@ def pick(k, state, target, others, minds, moves, behaviours, choices):
     best = np.empty(few, dtype=np.int64)
     kept = 0
     for i in range(few):
-        top = -1
-        for n in range(count):
-            if gain[n] > -np.inf and (top < 0 or gain[n] > gain[top]):
-                free = True
-                for j in range(kept):
-                    free = free and best[j] != n
-                if free:
-                    top = n
+        top = best_left(gain, allowed, best, kept)
         if top < 0 or (i > 0 and gain[top] < (1.0 - temper[SLACK]) * gain[best[0]]):
             break
         best[kept] = top

@@ -7,30 +7,35 @@ from collections.abc import Callable
 from types import FunctionType
 from typing import Any
 
-from numba import njit
+from numba.core import config
 
 from kumite.kernels import kept
+from kumite.kernels.within import Kernel
 
 
-def _kept_while_its_sources_are(decorate: Callable[..., Any]) -> Callable[..., Any]:
-    def compile_lazily(function: Callable[..., Any]) -> Any:
-        dispatcher = decorate(function)
-        kept.keep(dispatcher)
-        return dispatcher
-
-    return compile_lazily
+def _compiled(function: Callable[..., Any], *plugs: Any, **options: Any) -> Any:
+    if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
+        return function
+    made = Kernel(function, nogil=True, error_model="numpy", **options)
+    kept.keep(made, *plugs)
+    return made
 
 
 # error_model="numpy": no exceptions inside loops. Of fast-math only contraction (fused
 # multiply-add): nothing is reordered, so a run gives the same bytes as the last, whatever the
 # number of threads.
-kernel = _kept_while_its_sources_are(njit(nogil=True, error_model="numpy", fastmath={"contract"}))
-# Numba counts who uses an array whenever a tuple of arrays is looked into, one count for all cores:
-# most of the time of small kernels that are handed large tuples. These count nothing, so they must
-# neither make arrays nor return any to a kernel that counts. (Not a public option.)
-lean_kernel = _kept_while_its_sources_are(
-    njit(nogil=True, error_model="numpy", fastmath={"contract"}, _nrt=False)  # type: ignore[call-overload]
-)
+def kernel(function: Callable[..., Any]) -> Any:
+    """A function that is compiled when it is first called, and kept."""
+    return _compiled(function, fastmath={"contract"})
+
+
+def lean_kernel(function: Callable[..., Any]) -> Any:
+    """A kernel that must neither make arrays nor return any to a kernel that is not lean.
+
+    Numba counts who uses an array whenever a tuple of arrays is looked into, one count for all
+    cores: most of the time of small kernels that are handed large tuples. These count nothing.
+    """
+    return _compiled(function, fastmath={"contract"}, _nrt=False)  # not a public option
 
 
 def parallel_kernel(function: Callable[..., Any]) -> Any:
@@ -42,9 +47,7 @@ def parallel_kernel(function: Callable[..., Any]) -> Any:
     copy = FunctionType(function.__code__, function.__globals__, function.__name__)
     copy.__qualname__ = f"{function.__qualname__}_on_all_cores"
     copy.__doc__ = function.__doc__
-    dispatcher = njit(nogil=True, error_model="numpy", fastmath={"contract"}, parallel=True)(copy)
-    kept.keep(dispatcher)
-    return dispatcher
+    return _compiled(copy, fastmath={"contract"}, parallel=True)
 
 
 def plugged(template: Callable[..., Any], parallel: bool = False, **plugs: Any) -> Any:
@@ -52,8 +55,8 @@ def plugged(template: Callable[..., Any], parallel: bool = False, **plugs: Any) 
 
     It is kept on disk like any other, which neither a closure over kernels nor a kernel as an
     argument is: Numba finds kept code by their identity, which is new in every process. Here it is
-    found by the file and the name of the plugs, so these must be functions of a module. Outside of
-    this folder only the plugs' own files are watched for changes, not those they call.
+    found by the module and the name of the plugs, so these must be functions of a module. Outside
+    of this folder only the plugs' own files are watched for changes, not those they call.
 
     Nothing is contracted: a sum in the template must not depend on whether a plug was inlined.
     """
@@ -62,14 +65,12 @@ def plugged(template: Callable[..., Any], parallel: bool = False, **plugs: Any) 
         plain = getattr(plug, "py_func", plug)
         if "<" in plain.__qualname__:
             raise TypeError(f"{plain.__qualname__}: only functions of a module can be plugged in")
-        names += [name, plain.__code__.co_filename, plain.__qualname__]
+        names += [name, plain.__module__, plain.__qualname__]
     code = template.__code__
     copy = FunctionType(code, {**template.__globals__, **plugs}, template.__name__)
     copy.__qualname__ = f"{template.__qualname__}_{_digest(names)}"
     copy.__doc__ = template.__doc__
-    dispatcher = njit(nogil=True, error_model="numpy", parallel=parallel)(copy)
-    kept.keep(dispatcher, *plugs.values())
-    return dispatcher
+    return _compiled(copy, *plugs.values(), parallel=parallel)
 
 
 def _digest(names: list[str]) -> str:

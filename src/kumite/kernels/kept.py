@@ -121,6 +121,11 @@ class _Files:
         _used(folder)
         return data if kept == key else None  # a digest says less than the whole signature
 
+    def holds(self, key: tuple[Any, ...]) -> bool:
+        """Whether there is a file for a signature."""
+        folder = self._folder()
+        return folder is not None and (folder / self._file(key)).is_file()
+
     def flush(self) -> None:
         """Numba's wish to forget what is kept."""
         folder = self._folder()

@@ -315,9 +315,10 @@ def look_ahead(state, target, others, clear, moves, behaviours, weights, facing,
 
 
 @kernel
-def look_further(k, target, moves, behaviours, weights, facing):
-    """Q of stretch k by two exact backups: what it earns, and the best Q of the state after it."""
-    one = np.array([k])
+def look_further(action, target, moves, behaviours, weights, facing):
+    """Q of an action by two exact backups: what it earns, and the best Q of the state after it."""
+    one = moves.stretch[action : action + 1]
+    k = one[0]
     now, left = np.empty(1), np.empty(1)
     weigh(one, target, moves, behaviours, weights, now, left)
     x, z = target[0, 0], target[0, 2]
@@ -336,7 +337,10 @@ def look_further(k, target, moves, behaviours, weights, facing):
     stretches = moves.stretch[moves.action_start[state] : moves.action_start[state + 1]]
     reward, later = np.empty(stretches.shape[0]), np.empty(stretches.shape[0])
     weigh(stretches, then, moves, behaviours, after, reward, later)
-    now[0] += np.max(reward + later)
+    best = -np.inf
+    for n in range(stretches.shape[0]):
+        best = max(best, reward[n] + later[n])
+    now[0] += best
     if facing != 0.0:
         cut_by_turning_away(one, target, facing, moves, now)
     return now[0]

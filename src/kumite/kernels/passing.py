@@ -37,4 +37,4 @@ def sweep(start, end, radius_start, radius_end, way, origin, width, step, top, l
                     off = max(p * width - s, s - (p + 1) * width, 0.0)
                     rise = np.sqrt(max(r * r - off * off, 0.0))
                     top[p], low[p] = max(top[p], h + rise), min(low[p], h - rise)
-        span[f] += origin
+        span[f, 0], span[f, 1] = span[f, 0] + origin, span[f, 1] + origin

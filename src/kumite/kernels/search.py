@@ -160,7 +160,9 @@ def narrow(levels, d, comp):
 @kernel
 def ascending(scores):
     """The order in which a few scores ascend; equals stay as they are."""
-    order = np.arange(scores.shape[0])
+    order = np.empty(scores.shape[0], dtype=np.int64)
+    for c in range(scores.shape[0]):
+        order[c] = c
     for c in range(1, scores.shape[0]):
         n, at = order[c], c
         while at > 0 and scores[order[at - 1]] > scores[n]:
@@ -174,7 +176,10 @@ def ascending(scores):
 def best_first(nodes, first, count, player):
     """Order children so that what ``player`` prefers at once comes first: bounds come sooner."""
     sign = -1.0 if player == SEARCHER else 1.0
-    order = ascending(sign * nodes.comp[first : first + count])
+    scores = np.empty(count)
+    for c in range(count):
+        scores[c] = sign * nodes.comp[first + c]
+    order = ascending(scores)
     kept = empty_children(count, nodes.state.shape[1])
     for c in range(count):
         copy_row(nodes, first + c, kept, c)
@@ -323,11 +328,12 @@ def work(game, nodes, start, stop, step, left, most, player, prune, made, consid
     """
     block = empty_children((left + 1) * most, nodes.state.shape[1])
     levels = empty_levels(left, player)
-    turn = np.arange(start, stop, step)
-    if prune:
-        sign = -1.0 if player == SEARCHER else 1.0
-        turn = turn[ascending(sign * nodes.comp[turn])]
-    for n in turn:
+    sign = 0.0 if not prune else -1.0 if player == SEARCHER else 1.0  # equals stay in their order
+    scores = np.empty(max((stop - start + step - 1) // step, 0))
+    for w in range(scores.shape[0]):
+        scores[w] = sign * nodes.comp[start + w * step]
+    for w in ascending(scores):
+        n = start + w * step
         copy_row(nodes, n, block, 0)
         descend(game, left, most, block, levels, prune, made, considered)
         copy_row(block, 0, nodes, n)

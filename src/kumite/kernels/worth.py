@@ -206,10 +206,9 @@ def choose(moves, behaviours, weights, few, state, x, y, z, worth, gap):
     for _ in range(min(few, count)):
         a = np.argmax(worth[:count])
         worth[a] = -np.inf
-        k = moves.stretch[first + a]
-        value = look_further(k, target, moves, behaviours, weights, 0.0)
+        value = look_further(first + a, target, moves, behaviours, weights, 0.0)
         if value > most:
-            best, most = k, value
+            best, most = moves.stretch[first + a], value
     return best
 
 
