@@ -12,7 +12,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from kumite import rotation
 from kumite.clip import SIDES, Clip, forward_kinematics
 
 _FEW = 5  # frames that may stand apart, whatever their pose
@@ -30,7 +29,10 @@ def without_apart(clip: Clip) -> tuple[Clip, list[str]]:
     """The clip without frames that stand apart at its ends, and what was left out."""
     if len(clip) <= _FEW + _NEXT or not _may_stand_apart(clip):
         return clip, []
-    step, posed = _looked_at(clip, slice(None))
+    step, position = _steps(clip, slice(None))
+    if not np.any((step >= _FAR) & (step * clip.fps >= _FAST_FROM_T)):
+        return clip, []
+    posed = _posed(clip, position, clip.wxyz)
     first = _apart(step, posed, clip.fps)
     last = _apart(step[::-1], posed[::-1], clip.fps)
     if len(clip) - first - last < 2 or first + last == 0:
@@ -55,19 +57,19 @@ def without_apart(clip: Clip) -> tuple[Clip, list[str]]:
 def _may_stand_apart(clip: Clip) -> bool:
     """Whether a clip begins or ends in a pose, or with a snap: few do, and few frames tell."""
     for some in (slice(None, _FEW + 2), slice(-_FEW - 2, None)):
-        step, posed = _looked_at(clip, some)
-        if posed[0 if some.start is None else -1] or np.any(step >= _FAR):
+        step, position = _steps(clip, some)
+        end = slice(None, 1) if some.start is None else slice(-1, None)
+        if np.any(step >= _FAR) or _posed(clip, position[end], clip.wxyz[end])[0]:
             return True
     return False
 
 
-def _looked_at(clip: Clip, frames: slice) -> tuple[np.ndarray, np.ndarray]:
-    """How far the body goes to the next frame [F - 1] m, and whether it is in a pose [F]."""
-    wxyz = clip.wxyz[frames]
-    position, _ = forward_kinematics(clip.skeleton, clip.root_position[frames], wxyz)
+def _steps(clip: Clip, frames: slice) -> tuple[np.ndarray, np.ndarray]:
+    """How far the body goes to the next frame [F - 1] m, and where joints are [F, J, 3]."""
+    position, _ = forward_kinematics(clip.skeleton, clip.root_position[frames], clip.wxyz[frames])
     parts = [clip.skeleton.joint(r) for r in _PARTS]
     step = np.linalg.norm(np.diff(position[:, parts], axis=0), axis=2).max(axis=1)
-    return step, _posed(clip, position, wxyz)
+    return step, position
 
 
 _PARTS = ("pelvis", "head", *(f"{s}_{p}" for s in SIDES for p in ("hand", "foot")))
@@ -103,7 +105,7 @@ def _posed(clip: Clip, position: np.ndarray, wxyz: np.ndarray) -> np.ndarray:
         out &= (np.sum(upper * lower, axis=1) > _STRAIGHT) & (
             sign * np.sum(_unit(wrist - shoulders[side]) * across, axis=1) > _OUT
         )
-    turned = rotation.angle(wxyz[:, 1:], rotation.IDENTITY_WXYZ).mean(axis=1)
+    turned = 2 * np.arccos(np.minimum(np.abs(wxyz[:, 1:, 0]), 1.0)).mean(axis=1)
     return out | (turned < _AT_REST)
 
 
