@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kumite.checks import freeze
+from kumite.checks import freeze, instance
 from kumite.clip import SIDES, ClipSet, runs
 from kumite.errors import KumiteError
 
@@ -50,6 +50,7 @@ def find_contacts(
     shortest: contacts and gaps shorter than this are noise and are closed [s]. resting_height
     [2, 2] m: see :class:`Contacts`, where it is known; else it is measured, of all clips together.
     """
+    instance(clips, ClipSet, "find_contacts")
     if height <= 0 or speed <= 0 or shortest < 0:
         raise KumiteError("contacts: height and speed must be above 0, shortest not below 0")
     position, _ = clips.world

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kumite.annotate.contacts import velocity
-from kumite.checks import freeze
+from kumite.checks import freeze, instance
 from kumite.clip import LIMBS, ClipSet, runs, tip_positions
 from kumite.errors import KumiteError
 from kumite.rotation import planar_apply, planar_inverse
@@ -83,6 +83,7 @@ def find_strikes(
     clips: ClipSet, *, hand_speed: float = HAND_SPEED, foot_speed: float = FOOT_SPEED
 ) -> Strikes:
     """Effective hits; hand_speed: of a fist along the forearm, foot_speed: from the hips [m/s]."""
+    instance(clips, ClipSet, "find_strikes")
     if hand_speed <= 0 or foot_speed <= 0:
         raise KumiteError("strikes: the speed thresholds must be above 0")
     position, world = clips.world

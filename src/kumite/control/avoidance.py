@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kumite.body import Spheres, lay_spheres
+from kumite.checks import instance
 from kumite.clip import SIDES
 from kumite.control.attack import Attack, packed
 from kumite.control.volumes import joins_of, volumes_of
@@ -165,6 +166,7 @@ class AvoidanceSearch:
         spheres: Spheres | None = None,
     ) -> None:
         """spheres: the body's volume; by default laid to cover it. Errors: no part to use."""
+        instance(library, Library, "AvoidanceSearch")
         self.library, self.settings = library, settings or AvoidanceRules()
         clips = library.clips
         self.spheres = spheres or lay_spheres(clips.skeleton)

@@ -169,6 +169,7 @@ def strike(library: Library, **changes) -> Behaviour:
     It counts only while the target is in reach, :attr:`Behaviour.farthest`: no farther off than an
     action of the library strikes, or ends where the next one may. Beyond, it is worth nothing.
     """
+    instance(library, Library, "strike")
     changes.setdefault("grid", strike_grid(library.strikes.points))
     found = Behaviour("strike", **changes)
     if "farthest" in changes:
@@ -273,6 +274,7 @@ def solve(
     """Value iteration by full sweeps until a sweep changes no value by more than ``residual`` times
     the largest value. ``converged`` says whether it got there within ``most_sweeps``.
     """
+    instance(library, Library, "solve")
     begin = time.perf_counter()
     table = library.table
     tracks = stretch_tracks(library, behaviour.limbs)

@@ -14,6 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from kumite.annotate import AvoidanceParts, Strikes, find_contacts, find_strikes
+from kumite.checks import instance
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError
 from kumite.graph.distance import PoseFeatures, pose_features, squared_distances
@@ -56,6 +57,7 @@ def build_avoidance_library(
     bound: the farthest that a join may jump; None: the usual (:class:`JoinBound`).
     Errors: there are no parts.
     """
+    instance(clips, ClipSet, "build_avoidance_library")
     progress("finding contacts and effective hits")
     contacts, strikes = find_contacts(clips), find_strikes(clips)
     parts = chosen_parts(clips, contacts, avoidance, progress)

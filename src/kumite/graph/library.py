@@ -23,7 +23,7 @@ from kumite.annotate import (
     find_strikes,
     no_avoidance,
 )
-from kumite.checks import mapping, number, text, whole
+from kumite.checks import instance, mapping, number, text, whole
 from kumite.clip import ClipSet, Skeleton
 from kumite.errors import KumiteError
 from kumite.graph.distance import pose_features
@@ -139,6 +139,7 @@ def build_library(
     section 3.1); True: as they are found; False: none. progress is told each stage as it begins.
     Errors: too few frames; no such contact event; parts of other clips.
     """
+    instance(clips, ClipSet, "build_library")
     progress("finding contacts and effective hits")
     contacts = find_contacts(clips)
     strikes = find_strikes(clips)
@@ -324,6 +325,8 @@ def _preparing(header: Any, part: Callable[[str], dict[str, Any]], fps: float) -
 
 
 def save_library(path: Path | str, library: Library) -> None:
+    """Errors: no library; a file that cannot be written."""
+    instance(library, Library, "save_library")
     header = {
         "clip_names": list(library.clips.names),
         "fps": library.clips.fps,

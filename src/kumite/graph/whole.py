@@ -30,6 +30,7 @@ from kumite.annotate import (
     shorter_rests,
 )
 from kumite.annotate.action_file import SLIVER
+from kumite.checks import instance
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError
 from kumite.graph.distance import pose_features
@@ -66,6 +67,7 @@ def build_action_library(
     none. bound: the farthest that a join may jump; None: the usual (:class:`JoinBound`). Errors: no
     connected part with two actions that can be chosen.
     """
+    instance(clips, ClipSet, "build_action_library")
     if most_ways < 2:
         raise KumiteError(f"most_ways {most_ways}; expected at least 2")
     if not 0 < alike < np.inf:

@@ -38,6 +38,7 @@ from kumite.scene.controls import (
     check_orders,
     style_controls,
 )
+from kumite.scene.doors import check_scene
 from kumite.scene.fighters import ARENA, NEAREST, BoutSettings
 from kumite.scene.floor import Floor, Landing
 from kumite.scene.reactions import MOST_PHYSICAL, Reactions
@@ -61,6 +62,7 @@ class BoutScene:
         """Errors: a library whose graph is not one of whole actions; names in A⁺, A⁻ or at check
         points that no action has.
         """
+        check_scene(settings, library, seed)
         if not settings.fighters:
             raise KumiteError(f"{settings.title!r} is no fight by game tree; expected [[fighter]]s")
         self.settings = settings

@@ -16,6 +16,7 @@ from kumite.graph import Library
 from kumite.scene.balls import Balls, BallsSettings, aimed, capsules_of, velocity_to
 from kumite.scene.controls import SearchControl, search_controls
 from kumite.scene.dodgers import Dodgers, background
+from kumite.scene.doors import check_scene
 from kumite.scene.fighters import Finite, Metres, Name, Settings
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.recording import Event
@@ -97,6 +98,7 @@ class DodgeScene:
 
     def __init__(self, settings, library: Library, *, seed: int = 0) -> None:
         """Errors: nobody in it; a library without avoidance parts; too many characters."""
+        check_scene(settings, library, seed)
         if not settings.dodging:
             raise KumiteError(f"{settings.title!r} has nobody who avoids; expected [[dodger]]s")
         self.settings, self.library, self.title = settings, library, settings.title

@@ -15,6 +15,7 @@ import numpy as np
 
 from kumite.body import ARMS
 from kumite.body.spheres import SWORD
+from kumite.checks import instance
 from kumite.clip import LIMBS, Skeleton
 from kumite.control.attack import Attack
 from kumite.control.avoidance import AvoidanceSearch
@@ -27,6 +28,7 @@ from kumite.scene.attackers import Attackers, Blow, middle_of, skill_of
 from kumite.scene.blows import Blows, Contact
 from kumite.scene.dodge import DodgeSettings
 from kumite.scene.dodgers import Dodgers
+from kumite.scene.doors import check_scene
 from kumite.scene.live import RECOIL
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.recording import Event
@@ -101,6 +103,8 @@ class EvasionScene:
         Errors: either side is empty; a library without avoidance parts, or one without blows;
         libraries of different bodies or frame rates; too many characters.
         """
+        check_scene(settings, library, seed)
+        instance(attack, Library, "the attackers' library")
         if not (settings.dodging and settings.attacker):
             raise KumiteError(
                 f"{settings.title!r} needs somebody who avoids and somebody who attacks; expected "

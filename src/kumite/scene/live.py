@@ -27,6 +27,7 @@ from kumite.kernels import crowd as kernels
 from kumite.kernels.blow import NO_BLOW, NOBODY, swept_contact
 from kumite.kernels.character import MANY
 from kumite.rotation import rotate
+from kumite.scene.doors import a_place, check_scene
 from kumite.scene.floor import Floor, Landing
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.pairs import pair_up
@@ -84,6 +85,7 @@ class LiveScene:
 
         Errors: a library that nobody can strike with, an unknown behaviour, too many characters.
         """
+        check_scene(settings, library, seed)
         self.settings = settings
         self.library = library
         self.title = settings.title
@@ -238,10 +240,13 @@ class LiveScene:
         return self.cast.wxyz
 
     def move_object(self, name: str, position: np.ndarray) -> None:
-        """Put an object somewhere (its place of rest): seen from the next decision on."""
+        """Put an object somewhere (its place of rest): seen from the next decision on.
+
+        Errors: a place that is not three finite numbers.
+        """
         for o, thing in enumerate(self.objects):
             if thing.name == name:
-                self._home[o] = np.array(position, dtype=np.float64)
+                self._home[o] = a_place(position, name)
                 thing.position = self._home[o].copy()
                 self._swing[o][:] = 0.0
 

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 from scipy.spatial import KDTree
 
+from kumite.checks import instance
 from kumite.clip import SIDES, Skeleton, facing_frame, forward_kinematics
 from kumite.graph import Library
 from kumite.rotation import wrap_angle
@@ -82,7 +83,8 @@ def _goes_on(recording: Recording, k: int) -> np.ndarray:
 
 
 def measure(recording: Recording) -> Metrics:
-    """Score a recording."""
+    """Score a recording. Errors: it is none."""
+    instance(recording, Recording, "measure")
     skeleton, fps = recording.skeleton, recording.fps
     count = len(recording.names)
     aims: dict[str, str] = dict(recording.settings.get("aims_at", {}))

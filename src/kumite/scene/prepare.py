@@ -18,6 +18,7 @@ from kumite.graph.preparing import Preparing
 from kumite.kernels.blow import swept_contact
 from kumite.rotation import rotate
 from kumite.scene.balls import capsules_of
+from kumite.scene.doors import check_scene
 from kumite.scene.errands import PrepareSettings
 from kumite.scene.floor import TARGET_PARTS
 from kumite.scene.memory import refuse_too_many
@@ -60,6 +61,7 @@ class PrepareScene:
 
         Errors: another kind of library; motions that it does not have; obstacles that these do
         not clear; somebody who begins in an obstacle; too many characters."""
+        check_scene(settings, library, seed)
         if library.preparing is None:
             raise KumiteError(
                 f"{settings.title!r} is about preparation; expected a library built with "

@@ -158,6 +158,8 @@ def skeleton_from_header(header: Mapping[str, Any]) -> Skeleton:
 
 
 def save_recording(path: Path | str, recording: Recording) -> None:
+    """Errors: no recording; a file that cannot be written."""
+    checks.instance(recording, Recording, "save_recording")
     header = {
         "scene": recording.scene,
         "fps": recording.fps,

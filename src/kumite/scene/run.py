@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from kumite.checks import number
 from kumite.errors import KumiteError
 from kumite.scene.bout import BoutScene
 from kumite.scene.dodge import DodgeScene
@@ -32,8 +33,7 @@ def record(
     A scene that has run before goes on from where it is; its earlier events are left out, and times
     count from the recording's first frame.
     """
-    if not (np.isfinite(seconds) and seconds > 0):
-        raise KumiteError(f"seconds: {seconds}, expected more than 0")
+    seconds = number(seconds, "seconds", above=0.0)
     count, joints = len(scene.names), len(scene.skeleton)
     largest = MOST_BYTES / (16.0 * count * joints * scene.fps)  # of rotations, nearly all there is
     if seconds > largest:

@@ -9,6 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
+from kumite.checks import instance
 from kumite.clip import Skeleton
 from kumite.scene.recording import Event, Recording
 
@@ -115,6 +116,7 @@ class Playback:
     """A recording on the stage."""
 
     def __init__(self, recording: Recording) -> None:
+        instance(recording, Recording, "Playback")
         self.title = recording.scene
         self.fps = recording.fps
         self.skeleton = recording.skeleton

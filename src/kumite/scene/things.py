@@ -8,6 +8,7 @@ from kumite.body import Body
 from kumite.errors import KumiteError
 from kumite.graph.preparing import KINDS, Preparing
 from kumite.scene.balls import BOUNCE, REST, ROLLING
+from kumite.scene.doors import a_place
 from kumite.scene.errands import TargetSettings
 from kumite.scene.stage import SceneObject
 
@@ -153,7 +154,7 @@ class Things:
         """Put a ball somewhere."""
         if name not in self.names or self.kind[n := self.names.index(name)] != STRIKE:
             return
-        place = np.array(position, dtype=np.float64)
+        place = a_place(position, name)
         if self.lies[n]:
             place[1] = max(place[1], self.radius[n])
         self.position[n], self.velocity[n] = place, 0.0

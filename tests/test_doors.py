@@ -1,0 +1,98 @@
+"""Public functions say in one sentence what they were handed, and what they expected."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+import kumite
+from kumite.errors import KumiteError
+from kumite.export.bvh import write_bvh
+from kumite.export.gltf import write_glb
+from kumite.scene.doors import a_place
+from kumite.scene.recording import Event, Recording
+from tests import toys
+
+JUNK = (None, "sparring", 3, 1.5, [], {}, np.zeros(3), object())
+TAKES = {
+    "LiveScene": lambda x: kumite.LiveScene(x, None),  # type: ignore[arg-type]
+    "BoutScene": lambda x: kumite.BoutScene(x, None),  # type: ignore[arg-type]
+    "DodgeScene": lambda x: kumite.DodgeScene(x, None),  # type: ignore[arg-type]
+    "PrepareScene": lambda x: kumite.PrepareScene(x, None),  # type: ignore[arg-type]
+    "library of a scene": lambda x: kumite.LiveScene(kumite.load_scene("sparring"), x),
+    "measure": kumite.measure,
+    "save_recording": lambda x: kumite.save_recording("x.rec", x),
+    "save_library": lambda x: kumite.save_library("x.kumite", x),
+    "Playback": kumite.Playback,
+    "mirror": kumite.mirror,
+    "resample": lambda x: kumite.resample(x, 30.0),
+    "concatenate": kumite.concatenate,
+    "find_contacts": kumite.find_contacts,
+    "find_strikes": kumite.find_strikes,
+    "build_library": kumite.build_library,
+    "build_action_library": kumite.build_action_library,
+    "build_avoidance_library": kumite.build_avoidance_library,
+    "solve": lambda x: kumite.solve(x, kumite.approach()),
+    "strike": kumite.strike,
+    "AvoidanceSearch": kumite.AvoidanceSearch,
+    "write_glb": lambda x: write_glb("x.glb", x),
+    "write_bvh": lambda x: write_bvh("x.bvh", x),
+}
+
+
+@pytest.mark.parametrize("name", TAKES)
+def test_what_is_of_another_type_is_refused_in_a_sentence(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for junk in JUNK:
+        with pytest.raises(KumiteError) as said:
+            TAKES[name](junk)
+        assert "\n" not in str(said.value) and len(str(said.value)) < 200
+        assert re.search("expected|no clips", str(said.value))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_place_is_three_finite_numbers():
+    assert np.array_equal(a_place([1, 2.5, 3], "ball"), [1, 2.5, 3])
+    for place in ([np.nan, 0, 0], [0, np.inf, 0], [0, 0], "xyz", None, [1e300, 0, 0], [[1, 2, 3]]):
+        with pytest.raises(KumiteError, match="the place of 'ball'"):
+            a_place(place, "ball")
+
+
+@pytest.mark.parametrize(
+    ("kind", "data", "said"),
+    [
+        ("hit", {"speed": "fast"}, "'hit': speed: 'fast'; expected a number"),
+        ("hit", {"place": [0, 1]}, "'hit': place is [2], expected [3]"),
+        ("avoidance", {"costs": "abc"}, "'avoidance': costs"),
+        ("launch", {"level": np.nan}, "'launch': level: nan"),
+        ("throw", {"attack": 1.5}, "'throw': attack: 1.5; expected a whole number"),
+    ],
+)
+def test_what_an_event_says_is_of_its_kind(kind, data, said):
+    with pytest.raises(KumiteError, match=re.escape(said)):
+        Event(3, kind, "red", data)
+
+
+def test_a_recording_in_memory_is_checked():
+    clip = toys.still(5)
+    good = {
+        "scene": "x", "fps": 30.0, "skeleton": clip.skeleton, "names": ("red",),
+        "root_position": clip.root_position[:, None], "wxyz": clip.wxyz[:, None],
+        "contacts": np.ones((5, 1, 2), bool), "library_frame": np.zeros((5, 1), int),
+    }  # fmt: skip
+    Recording(**good)
+    for change, said in (
+        ({"fps": 0}, "fps: 0; expected a number more than 0"),
+        ({"names": ()}, "expected at least 1"),
+        ({"names": ("a", "b")}, "expected [F, 2, 3]"),
+        ({"wxyz": np.zeros((5, 1, 18, 4))}, "expected unit quaternions"),
+        ({"library_frame": np.full((5, 1), 0.5)}, "expected whole numbers"),
+        ({"library_frame": np.full((5, 1), -2)}, "NO_FRAME"),
+        ({"events": (Event(9, "x", "red"),)}, "an event in frame 9; expected 0 to 5"),
+        ({"events": (Event(1, "x", "blue"),)}, "unknown character of an event 'blue'"),
+        ({"settings": {"object_radius": {"a": "big"}}}, "object_radius of 'a': 'big'"),
+    ):
+        with pytest.raises(KumiteError, match=re.escape(said)):
+            Recording(**{**good, **change})
