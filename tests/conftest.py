@@ -10,7 +10,8 @@ import pytest
 
 from kumite import caches, cli
 from kumite import mocap as mocap_files
-from kumite.graph import Library, build_library, builtin_library
+from kumite.graph import Library, build_library
+from tests.shared import builtin
 
 # Tests that make libraries and policies anew, in a cache folder of their own, share compiled code.
 os.environ.setdefault("NUMBA_CACHE_DIR", str(caches.compiled() or ""))
@@ -30,13 +31,13 @@ def mocap() -> Path:
 @pytest.fixture(scope="session")
 def library() -> Library:
     """The built-in performer's library."""
-    return builtin_library(None)
+    return builtin()
 
 
 @pytest.fixture(scope="session")
 def whole() -> Library:
     """The built-in performer's library of whole actions."""
-    return builtin_library(None, level="actions")
+    return builtin(level="actions")
 
 
 @pytest.fixture(scope="session")
@@ -48,7 +49,7 @@ def boxer(mocap: Path) -> Library:
 @pytest.fixture(scope="session")
 def fighters() -> Library:
     """The built-in performer's library of whole actions, as it boxes."""
-    return builtin_library(None, style="boxing", level="actions")
+    return builtin("boxing", "actions")
 
 
 @pytest.fixture

@@ -13,9 +13,10 @@ from kumite.control import PreparationSettings, approach_motions, gradual, train
 from kumite.control import preparation as learning
 from kumite.control.preparation import build_process
 from kumite.errors import KumiteError
-from kumite.graph import Library, builtin_library, save_library
+from kumite.graph import Library, save_library
 from kumite.graph.preparing import Preparing
 from kumite.rotation import planar_compose, planar_inverse
+from tests.shared import builtin
 
 QUICK = gradual(places=16, batch=1)
 
@@ -27,7 +28,7 @@ def prepared(library: Library) -> Preparing:
 
 @pytest.fixture(scope="module")
 def library() -> Library:
-    return builtin_library(None, style="targets", level="preparation")
+    return builtin("targets", "preparation")
 
 
 def test_every_core_that_moves_is_steered(library: Library):

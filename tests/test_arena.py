@@ -14,20 +14,21 @@ from kumite.control.game_tree import Rules
 from kumite.errors import KumiteError
 from kumite.export.gltf import write_glb
 from kumite.export.sheet import recording_sheet
-from kumite.graph import Library, builtin_library
+from kumite.graph import Library
 from kumite.scene import BoutScene, Playback, SceneSettings, load_scene, record
+from tests.shared import builtin
 
 SLACK = 0.1  # m: bodies sway and joins blend about where the actions lead
 
 
 @pytest.fixture(scope="module")
 def boxing() -> Library:
-    return builtin_library(None, level="actions")
+    return builtin(level="actions")
 
 
 @pytest.fixture(scope="module")
 def running() -> Library:
-    return builtin_library(None, style="locomotion", level="actions")
+    return builtin("locomotion", "actions")
 
 
 def _settings(name: str, **bout) -> SceneSettings:

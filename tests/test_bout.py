@@ -9,15 +9,16 @@ import pytest
 
 from kumite.control.game_tree import GameTree, Player
 from kumite.errors import KumiteError
-from kumite.graph import Library, build_action_library, builtin_library
+from kumite.graph import Library, build_action_library
 from kumite.mocap import load
 from kumite.scene import BoutScene, SceneSettings, load_scene, measure, record
+from tests.shared import builtin
 
 
 @pytest.fixture(scope="module")
 def actions() -> Library:
     """The built-in boxer's actions."""
-    return builtin_library(None, level="actions")
+    return builtin(level="actions")
 
 
 def _fight(actions: Library, **changes) -> BoutScene:

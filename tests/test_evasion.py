@@ -12,24 +12,25 @@ from kumite.control.attack import Attack, from_limbs
 from kumite.control.avoidance import AvoidanceSearch, Standing
 from kumite.control.counter import CounterSearch
 from kumite.errors import KumiteError
-from kumite.graph import Library, builtin_library
+from kumite.graph import Library
 from kumite.rotation import rotate
 from kumite.scene import EvasionScene, builtin_scenes, measure, record
 from kumite.scene.attackers import recorded_attack
 from kumite.scene.evasion import EvasionScene as Scene
 from kumite.scene.settings import SceneSettings
+from tests.shared import builtin
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
 def avoiding() -> Library:
-    return builtin_library(None, style="avoidance", level="avoidance")
+    return builtin("avoidance", "avoidance")
 
 
 @pytest.fixture(scope="module")
 def swordsman() -> Library:
-    return builtin_library(None, style="sword")
+    return builtin("sword")
 
 
 @pytest.fixture(scope="module")
@@ -179,7 +180,7 @@ def test_counters_meet_what_they_are_meant_for(fighting: AvoidanceSearch):
 
 @pytest.fixture(scope="module")
 def fighting() -> AvoidanceSearch:
-    return AvoidanceSearch(builtin_library(None, style="boxing", level="avoidance"))
+    return AvoidanceSearch(builtin("boxing", "avoidance"))
 
 
 DODGER = '[[dodger]]\nname = "a"\nposition = [0, 1]\n'

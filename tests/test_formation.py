@@ -9,9 +9,9 @@ import pytest
 from pydantic import ValidationError
 
 from kumite.errors import KumiteError
-from kumite.graph import builtin_library
 from kumite.scene import BoutScene, SceneSettings, load_scene, with_count
 from kumite.scene.formation import APART, PairsSettings
+from tests.shared import builtin
 
 SIDES = {"one": {"name": "red"}, "other": {"name": "blue"}}
 
@@ -100,9 +100,7 @@ def test_those_who_face_each_other_share_check_points_by_the_middle_between_them
 
 @pytest.mark.slow
 def test_at_the_last_check_point_of_the_spiral_red_knocks_blue_down():
-    scene = BoutScene(
-        with_count(load_scene("spiral"), 24), builtin_library(None, level="actions"), seed=1
-    )
+    scene = BoutScene(with_count(load_scene("spiral"), 24), builtin(level="actions"), seed=1)
     routes = [r for r in scene.routes[::2] if r is not None]
     off, felled = [], []  # m of the middle of a pair from its path; m from its end, s
     for _ in range(round(30.0 * scene.fps)):

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from kumite.errors import KumiteError
-from kumite.graph import Library, builtin_library, save_library
+from kumite.graph import Library, save_library
 from kumite.rotation import angle
 from kumite.scene import PrepareScene, load_scene, record, with_count
 from kumite.scene.settings import SceneSettings
 from kumite.scene.walkers import NOTHING, OFF, ON_THE_WAY, STEEPEST
+from tests.shared import builtin
 
 TARGETS = [
     {"name": "ball", "motion": "kick_ball", "position": (0.5, 3.0)},
@@ -25,7 +26,7 @@ TARGETS = [
 
 @pytest.fixture(scope="module")
 def targets() -> Library:
-    return builtin_library(None, style="targets", level="preparation")
+    return builtin("targets", "preparation")
 
 
 @pytest.fixture(scope="module")

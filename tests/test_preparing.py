@@ -18,7 +18,6 @@ from kumite.graph import (
     Targets,
     authored_targets,
     build_preparation_library,
-    builtin_library,
     load_library,
     save_library,
 )
@@ -27,6 +26,7 @@ from kumite.graph.preparing import KINDS, MARGIN, PLACE, Preparing, find_about
 from kumite.kernels import passing
 from kumite.performer import perform
 from kumite.rotation import planar_apply, planar_inverse, rotate
+from tests.shared import builtin
 
 ABOUT = {
     "duck_under": "under",
@@ -45,7 +45,7 @@ def prepared(library: Library) -> Preparing:
 
 @pytest.fixture(scope="module")
 def library() -> Library:
-    return builtin_library(None, style="targets", level="preparation")
+    return builtin("targets", "preparation")
 
 
 @pytest.fixture(scope="module")
@@ -259,7 +259,7 @@ def test_libraries_that_cannot_be_built(library):
     with pytest.raises(KumiteError, match=r"target 'x': frames .* no part of one clip"):
         build_preparation_library(clips, across)
     with pytest.raises(KumiteError, match="no target motion: none of these clips marks"):
-        builtin_library(None, style="locomotion", level="preparation")
+        builtin("locomotion", "preparation")
 
 
 def test_a_target_that_falls_back_is_told(library):

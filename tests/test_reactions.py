@@ -12,19 +12,20 @@ from kumite.body import keep_out
 from kumite.clip import SIDES, forward_kinematics
 from kumite.control.game_tree import GameTree
 from kumite.errors import KumiteError
-from kumite.graph import Library, builtin_library
+from kumite.graph import Library
 from kumite.kernels.blow import NO_BLOW
 from kumite.kernels.moves import FIELDS, place_at
 from kumite.scene import BoutScene, SceneSettings, load_scene, measure, record
 from kumite.scene.apart import held_apart, pairs, push_apart
 from kumite.scene.floor import PUSH_SPEED
 from kumite.scene.reactions import MOST_PHYSICAL, Reactions
+from tests.shared import builtin
 
 
 @pytest.fixture(scope="module")
 def actions() -> Library:
     """The built-in boxer's actions."""
-    return builtin_library(None, level="actions")
+    return builtin(level="actions")
 
 
 def _fight(actions: Library, reactions: str = "auto", seed: int = 1) -> BoutScene:

@@ -13,7 +13,7 @@ from kumite.control import STYLES, CheckPoint, Progress, Route
 from kumite.errors import KumiteError
 from kumite.export.gltf import write_glb
 from kumite.export.sheet import recording_sheet
-from kumite.graph import Library, builtin_library
+from kumite.graph import Library
 from kumite.scene import (
     BoutScene,
     Playback,
@@ -25,6 +25,7 @@ from kumite.scene import (
 )
 from kumite.scene.look import car
 from kumite.scene.story import BRAKE, CLEAR, CueSettings, Story, Vehicle, VehicleSettings
+from tests.shared import builtin
 
 FPS = 60.0
 
@@ -179,7 +180,7 @@ def test_a_cue_comes_when_all_whom_it_waits_for_are_there():
 
 @pytest.fixture(scope="module")
 def actions() -> Library:
-    return builtin_library(None, level="actions")
+    return builtin(level="actions")
 
 
 def _settings(**more) -> dict[str, Any]:
@@ -345,7 +346,7 @@ def test_cues_of_unknown_actions_are_refused(actions: Library, orders: dict):
 def _run(name: str, seconds: float, seed: int) -> BoutScene:
     settings = load_scene(name)
     assert settings.bout is not None
-    library = builtin_library(None, style=settings.bout.library, level="actions")
+    library = builtin(settings.bout.library, "actions")
     scene = BoutScene(settings, library, seed=seed)
     for _ in range(round(seconds * scene.fps)):
         scene.step()

@@ -11,7 +11,7 @@ import pytest
 from kumite.control.attack import thrown
 from kumite.control.avoidance import AvoidanceRules
 from kumite.errors import KumiteError
-from kumite.graph import Library, builtin_library
+from kumite.graph import Library
 from kumite.rotation import planar_apply
 from kumite.scene import (
     DodgeScene,
@@ -32,13 +32,14 @@ from kumite.studio.props import TARGET_COLOUR
 from kumite.studio.throwing import BELOW, NEAR, aim_along
 from kumite.studio.wording import EventLog, describe, place, score_html, struck
 from tests import browser
+from tests.shared import builtin
 from tests.test_studio import running, wait
 
 
 @pytest.fixture(scope="module")
 def avoiders() -> Library:
     """The built-in performer's library of avoidance."""
-    return builtin_library(None, style="avoidance", level="avoidance")
+    return builtin("avoidance", "avoidance")
 
 
 def dodgeball(library: Library, throws: int = 0, count: int | None = None) -> DodgeScene:

@@ -10,7 +10,7 @@ import pytest
 
 from kumite.annotate import find_balance
 from kumite.body import skin_vertices
-from kumite.graph import Library, builtin_library
+from kumite.graph import Library
 from kumite.rotation import from_yaw, rotate
 from kumite.scene import (
     Playback,
@@ -27,6 +27,7 @@ from kumite.studio import Studio
 from kumite.studio.leading import DOWN, LEFT, NEAR, RIGHT, STEP, UP, Leader, meant, way_seen
 from kumite.studio.wording import EventLog, describe, lines_html, score_html
 from tests import browser
+from tests.shared import builtin
 from tests.test_studio import running, wait
 
 Make = Callable[..., PrepareScene]
@@ -35,7 +36,7 @@ Make = Callable[..., PrepareScene]
 @pytest.fixture(scope="module")
 def targets() -> Library:
     """The built-in performer's library for preparation."""
-    return builtin_library(None, style="targets", level="preparation")
+    return builtin("targets", "preparation")
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ import pytest
 from kumite.clip import LIMBS, forward_kinematics
 from kumite.control import approach_motions, gradual
 from kumite.control.guide import Guide, learned_guide
-from kumite.graph import Library, builtin_library
+from kumite.graph import Library
 from kumite.graph.hierarchy import ways_into_cores
 from kumite.graph.preparing import KINDS
 from kumite.rotation import (
@@ -27,6 +27,7 @@ from kumite.scene.errands import TargetSettings
 from kumite.scene.settings import SceneSettings
 from kumite.scene.things import MASS_RATIO, Things
 from kumite.scene.walkers import OFF, Walkers
+from tests.shared import builtin
 
 STRIKE = KINDS.index("strike")
 QUICK = gradual(places=16, batch=1)
@@ -34,7 +35,7 @@ QUICK = gradual(places=16, batch=1)
 
 @pytest.fixture(scope="module")
 def targets() -> Library:
-    return builtin_library(None, style="targets", level="preparation")
+    return builtin("targets", "preparation")
 
 
 @pytest.fixture(scope="module")
