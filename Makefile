@@ -13,6 +13,7 @@ demo: $(RUN)
 	$(BIN)/kumite studio sparring
 
 test: lint
+	$(BIN)/python -m kumite.warm  # once, before each worker does
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -m jit_off
 
