@@ -22,6 +22,7 @@ fast: $(DEV)
 
 fuzz: $(DEV)
 	$(BIN)/python -m tests.fuzz --cases $(CASES)
+	KUMITE_FUZZ=$(CASES) $(BIN)/python -m pytest tests/fuzz/test_socket.py
 
 lint: $(DEV)
 	$(BIN)/ruff check .

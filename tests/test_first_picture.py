@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import signal
 import subprocess
 import sys
 import threading
 import time
+import urllib.request
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import psutil
@@ -144,3 +148,31 @@ def test_nothing_that_works_for_it_is_left_behind():
     coming.stop()
     assert wait(lambda: not child.is_running() or child.status() == psutil.STATUS_ZOMBIE)
     assert found[0].poll() is not None
+
+
+@pytest.mark.slow
+def test_a_first_start_shows_the_recorded_fight_and_ends_cleanly(tmp_path: Path):
+    environment = {**os.environ, "KUMITE_CACHE": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path)}
+    studio = subprocess.Popen(
+        [sys.executable, "-u", "-m", "kumite", "studio", "target", "--port", "0", "--no-browser"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env=environment,
+        start_new_session=True,
+    )
+    assert studio.stdout is not None
+    said = [studio.stdout.readline(), studio.stdout.readline()]
+    url = said[0].split()[1]
+    assert "recorded fight" in said[1] and "Target" in said[1] and "only this once" in said[1]
+    with urllib.request.urlopen(url, timeout=30) as page:
+        assert b"<html" in page.read(2000).lower()
+    parent = psutil.Process(studio.pid)
+    assert wait(lambda: parent.children(recursive=True), 30)
+    time.sleep(1.0)
+    working = parent.children(recursive=True)
+    studio.send_signal(signal.SIGINT)
+    rest = studio.communicate(timeout=60)[0]
+    assert studio.returncode == 0 and "studio closed" in rest and "Traceback" not in rest
+    _, alive = psutil.wait_procs(working, timeout=10)
+    assert not alive

@@ -7,12 +7,14 @@ import signal
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.table import Table
 
+from kumite.cli.ahead import Wanted, is_cold, prepare
 from kumite.cli.app import INTERRUPTED, JsonOption, app, err, out, print_json
 from kumite.cli.complete import complete_scene, complete_shown
 from kumite.cli.library import is_library
@@ -72,6 +74,16 @@ def _settings(scene: str, count: int | None, throws: int | None) -> Any:
     settings = load_scene(scene)
     settings = settings if count is None else with_count(settings, count)
     return settings if throws is None else with_throws(settings, throws)
+
+
+def settings_of(wanted: Wanted) -> Any:
+    """The scene that is wanted, as it is to be run."""
+    return _settings(wanted.scene, wanted.count, wanted.throws)
+
+
+def live_scene(wanted: Wanted) -> Any:
+    """The scene that is wanted, ready to run."""
+    return _live_scene(settings_of(wanted), wanted.library, wanted.seed)
 
 
 def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
@@ -321,7 +333,9 @@ def studio(
         list[str] | None,
         typer.Option(help="Another name that the page is asked for as, of a proxy or a tunnel."),
     ] = None,
-    seconds: Annotated[float | None, typer.Option(help="End by itself after this time.")] = None,
+    seconds: Annotated[
+        float | None, typer.Option(help="End by itself after this time [s] of the live scene.")
+    ] = None,
     browser: Annotated[bool, typer.Option(help="Open a browser where there is one.")] = True,
 ) -> None:
     """Watch a scene live in the browser, play a recording, or a library's actions one by one."""
@@ -332,11 +346,13 @@ def studio(
             raise KumiteError(
                 f"DEMO_SECONDS={os.environ['DEMO_SECONDS']!r}: expected a number of seconds"
             ) from None
-    stage = _stage(scene, library, count, throws, seed)
+    wanted = Wanted(scene, library, count, throws, seed)
+    stage, coming = _shown_first(wanted)
     from kumite.studio import serve
 
     serve(
         stage,
+        coming=coming,
         host=host,
         port=8080 if port is None else port,
         strict_port=port is not None,
@@ -347,11 +363,25 @@ def studio(
     )
 
 
+def _shown_first(wanted: Wanted) -> tuple[Any, Any]:
+    """What the studio shows, and what is prepared meanwhile where nothing is compiled yet."""
+    if _is_played(wanted.scene) or not is_cold():
+        return _stage(*wanted), None
+    from kumite.studio import Coming, Interlude
+
+    return Interlude(), Coming(settings_of(wanted).title, partial(prepare, wanted))
+
+
+def _is_played(scene: str) -> bool:
+    """Whether that is a recording or a library, not a scene."""
+    return scene.endswith(".rec") or is_library(scene)
+
+
 def _stage(
     scene: str, library: Path | None, count: int | None, throws: int | None, seed: int
 ) -> Any:
     """What the studio is to show."""
-    if not scene.endswith(".rec") and not is_library(scene):
+    if not _is_played(scene):
         return _live_scene(_settings(scene, count, throws), library, seed)
     from kumite.graph import load_library
     from kumite.scene import ActionPlayback, Playback, load_recording

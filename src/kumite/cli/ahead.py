@@ -1,0 +1,124 @@
+"""Preparing a scene in other processes, while the studio shows a recorded fight.
+
+What a first start costs is compiling, a minute of it. It is done beside the studio, once for all:
+the code, the built-in library and the policies are kept on disk, and the studio finds them there.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from kumite import caches
+from kumite.cli.app import out
+from kumite.cli.progress import progress
+from kumite.errors import KumiteError
+
+if TYPE_CHECKING:
+    from kumite.studio import Coming
+
+FEW = 30  # kept kernels: nothing to speak of is compiled yet
+OF_COMPILING = 0.9  # share of all work
+REHEARSED = 2.0  # s of a scene that are run, so that all that it calls is compiled
+_COMPILING = re.compile(r"compiling (\d+) of (\d+)")
+
+
+class Wanted(NamedTuple):
+    """A scene as it is asked for on the command line."""
+
+    scene: str
+    library: Path | None
+    count: int | None
+    throws: int | None
+    seed: int
+
+
+def is_cold() -> bool:
+    """Whether nearly nothing is compiled yet: a first start takes a while."""
+    folder = caches.compiled()
+    return folder is not None and len([*islice(folder.rglob("*.nbc"), FEW)]) < FEW
+
+
+def prepare(wanted: Wanted, coming: Coming) -> Any:
+    """The scene, when all that it needs is compiled and kept. Errors: what is wrong with it."""
+    from kumite.cli.scenes import live_scene
+
+    with progress() as bars:
+        number = bars.add("preparing, only this once", 1.0)
+
+        def tell(doing: str, share: float) -> None:
+            coming.tell(doing, share)
+            bars.update(number, share, note=doing)
+
+        _follow(wanted, coming, tell)
+    coming.tell("almost there", 1.0)
+    live = live_scene(wanted)
+    _rehearse(live, wanted.seed)
+    out.print(f"live: {coming.name}", markup=False, highlight=False)
+    return live
+
+
+def _follow(wanted: Wanted, coming: Coming, tell: Callable[[str, float], None]) -> None:
+    """Have another process prepare everything on disk, and say how far it is."""
+    paths = [str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")]
+    process = subprocess.Popen(
+        [sys.executable, "-P", "-m", "kumite.cli.ahead", json.dumps(wanted, default=str)],
+        stdin=subprocess.PIPE,  # it ends when this is closed, however we end
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        encoding="utf-8",
+        errors="replace",
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(p for p in paths if p)},
+        start_new_session=True,
+    )
+    coming.own(process)
+    said, share = "", 0.0
+    with process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            said = line.strip() or said
+            found = _COMPILING.fullmatch(said)
+            if found:
+                share = OF_COMPILING * int(found[1]) / int(found[2])
+            tell(said, share)
+    if process.returncode == 2:
+        raise KumiteError(said.removeprefix("error: "))
+    # Of any other end nothing is lost: what is missing is compiled when it is called.
+
+
+def _rehearse(live: Any, seed: int) -> None:
+    """Run a scene for a while and start it again: no picture of it waits for a compiler."""
+    for _ in range(round(REHEARSED * live.fps)):
+        live.step()
+    live.reset(seed)
+
+
+def _end_with_parent() -> None:
+    sys.stdin.read()
+    os._exit(1)
+
+
+def main() -> None:
+    """``python -m kumite.cli.ahead WANTED``: prepare, and say on standard output what is done."""
+    from kumite.cli.scenes import live_scene
+
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    scene, library, *rest = json.loads(sys.argv[1])
+    wanted = Wanted(scene, None if library is None else Path(library), *rest)
+    try:
+        _rehearse(live_scene(wanted), wanted.seed)
+    except KumiteError as error:
+        print(f"error: {error}", flush=True)
+        sys.exit(2)
+
+
+if __name__ == "__main__":
+    main()
