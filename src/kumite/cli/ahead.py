@@ -13,11 +13,9 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
-from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from kumite import caches
 from kumite.cli.app import out
 from kumite.cli.progress import progress
 from kumite.errors import KumiteError
@@ -25,7 +23,7 @@ from kumite.errors import KumiteError
 if TYPE_CHECKING:
     from kumite.studio import Coming
 
-FEW = 30  # kept kernels: nothing to speak of is compiled yet
+WORTH_SHOWING = 6.0  # s of compiling ahead from which on a recorded fight is shown
 OF_COMPILING = 0.9  # share of all work
 REHEARSED = 2.0  # s of a scene that are run, so that all that it calls is compiled
 _COMPILING = re.compile(r"compiling (\d+) of (\d+)")
@@ -41,10 +39,13 @@ class Wanted(NamedTuple):
     seed: int
 
 
-def is_cold() -> bool:
-    """Whether nearly nothing is compiled yet: a first start takes a while."""
-    folder = caches.compiled()
-    return folder is not None and len([*islice(folder.rglob("*.nbc"), FEW)]) < FEW
+def is_cold(wanted: Wanted) -> bool:
+    """Whether so much of what a scene needs is not compiled yet that it takes a while."""
+    from kumite.cli.scenes import settings_of
+    from kumite.warm import missing, needs_of
+
+    needs = needs_of(settings_of(wanted), wanted.library is None)
+    return sum(row.seconds for row in missing(needs)) > WORTH_SHOWING
 
 
 def prepare(wanted: Wanted, coming: Coming) -> Any:
@@ -108,12 +109,18 @@ def _end_with_parent() -> None:
 
 def main() -> None:
     """``python -m kumite.cli.ahead WANTED``: prepare, and say on standard output what is done."""
-    from kumite.cli.scenes import live_scene
+    from kumite.cli.scenes import live_scene, settings_of
+    from kumite.warm import warm
 
     threading.Thread(target=_end_with_parent, daemon=True).start()
     scene, library, *rest = json.loads(sys.argv[1])
     wanted = Wanted(scene, None if library is None else Path(library), *rest)
     try:
+        warm(
+            [settings_of(wanted)],
+            lambda done, total: print(f"compiling {done} of {total}", flush=True),
+            building=wanted.library is None,
+        )
         _rehearse(live_scene(wanted), wanted.seed)
     except KumiteError as error:
         print(f"error: {error}", flush=True)

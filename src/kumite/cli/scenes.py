@@ -365,7 +365,7 @@ def studio(
 
 def _shown_first(wanted: Wanted) -> tuple[Any, Any]:
     """What the studio shows, and what is prepared meanwhile where nothing is compiled yet."""
-    if _is_played(wanted.scene) or not is_cold():
+    if _is_played(wanted.scene) or not is_cold(wanted):
         return _stage(*wanted), None
     from kumite.studio import Coming, Interlude
 
