@@ -19,13 +19,7 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-try:
-    from platformdirs import user_cache_dir  # pyright: ignore[reportMissingImports]
-except ModuleNotFoundError:  # an environment that was set up before it was asked for
-
-    def user_cache_dir(appname: str, appauthor: bool) -> str:
-        return os.path.join(os.environ.get("XDG_CACHE_HOME") or "~/.cache", appname)  # noqa: PTH118
-
+from platformdirs import user_cache_dir
 
 NAME = "KUMITE_CACHE"
 

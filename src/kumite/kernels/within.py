@@ -4,7 +4,7 @@ Numba makes of every function, for every signature, machine code, a wrapper for 
 C. A kernel that only other kernels call needs none of them: its intermediate code is linked into
 theirs. For small functions of many arrays that is a third of the time that compiling takes.
 
-What is used of Numba here is not public; it has been the same from 0.60 to 0.68.
+What is used of Numba here is not public: pyproject.toml allows the one version it was tried with.
 """
 
 # pyright: reportAttributeAccessIssue=false, reportArgumentType=false

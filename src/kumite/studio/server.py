@@ -113,7 +113,7 @@ def open_server(
         close_server(server)
         raise KumiteError(
             f"viser {viser.__version__} opens its server in an unknown way, so that it cannot be "
-            "guarded; expected the version in constraints.txt"
+            "guarded; expected the version in requirements/run.txt"
         )
     gate.server = server
     if strict and wanted and server.get_port() != wanted:  # taken between the probe and the bind
