@@ -6,9 +6,14 @@ import importlib
 import re
 import runpy
 import shlex
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from typer.core import TyperGroup
+from typer.main import get_command
+
+from kumite.cli.app import app
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("", ".mocap", ".performer", ".annotate", ".body", ".graph", ".synthesis", ".control")
@@ -53,6 +58,27 @@ def test_the_documents_python_runs(document: str, here: Path):
     assert code
     (here / "document.py").write_text(code, "utf-8")
     runpy.run_path("document.py", run_name="__main__")
+
+
+def commands() -> list[list[str]]:
+    """Every ``kumite`` line of the README, in order, cut into words."""
+    lines = [line.split("#")[0].strip() for b in blocks("sh") for line in b.splitlines()]
+    return [shlex.split(line)[1:] for line in lines if line.startswith("kumite ")]
+
+
+def test_the_readmes_commands_lead_where_they_say():
+    """Options are known; files are made by an earlier line; libraries that are built are used."""
+    root = get_command(app)
+    assert isinstance(root, TyperGroup)
+    made, used = {"my_mocap"}, set()
+    for name, *words in commands():
+        root.commands[name].make_context(name, list(words))  # errors: an option that is unknown
+        outputs = {b for a, b in pairwise(words) if a in ("-o", "--out", "--output", "--plot")}
+        files = {w for w in words if re.search(r"^my_mocap$|\.(kumite|rec|txt|toml)$", w)}
+        assert files - outputs <= made, f"{name} {words}"
+        used |= files - outputs
+        made |= outputs
+    assert {f for f in made if f.endswith((".kumite", ".txt"))} <= used
 
 
 @pytest.mark.slow

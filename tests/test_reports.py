@@ -24,8 +24,8 @@ def told(names: tuple[str, ...], *events: tuple[int, str, str, dict], **settings
         names=names,
         root_position=np.zeros((*shape, 3)),
         wxyz=np.tile([1.0, 0.0, 0.0, 0.0], (*shape, len(skeleton), 1)),
-        contacts=np.zeros((*shape, 2)),
-        library_frame=np.zeros(shape),
+        contacts=np.zeros((*shape, 2), dtype=bool),
+        library_frame=np.zeros(shape, dtype=int),
         events=tuple(Event(*e) for e in events),
         settings=settings,
     )

@@ -180,8 +180,8 @@ def test_a_ball_is_shown_where_it_comes_nearest():
         names=("anna",),
         root_position=clip.root_position[:, None],
         wxyz=clip.wxyz[:, None],
-        contacts=np.ones((60, 1, 2)),
-        library_frame=np.zeros((60, 1)),
+        contacts=np.ones((60, 1, 2), dtype=bool),
+        library_frame=np.zeros((60, 1), dtype=int),
         objects=("ball 1",),
         object_position=ball[:, None],
         events=(

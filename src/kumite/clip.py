@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kumite import checks, rotation
+from kumite.brief import brief, pictured
 from kumite.errors import KumiteError
 from kumite.kernels import pose as pose_kernels
 
@@ -40,6 +41,7 @@ LIMBS = ("left_hand", "right_hand", "left_foot", "right_foot")
 """The limbs that can strike, in the order of every [.., 4] limb array."""
 
 
+@brief
 @dataclass(frozen=True)
 class Skeleton:
     """A tree of joints with rigid bones, parents before children."""
@@ -82,6 +84,9 @@ class Skeleton:
                 raise KumiteError(f"skeleton: {role} is joint {joint}; expected 0 to {count - 1}")
         if np.any((self.tip_parents < 0) | (self.tip_parents >= count)):
             raise KumiteError(f"skeleton: tip parents must be joints, 0 to {count - 1}")
+
+    def facts(self) -> list[str]:
+        return [f"{len(self)} joints from {self.names[0]}", f"{len(self.roles)} roles"]
 
     def __len__(self) -> int:
         return len(self.names)
@@ -181,6 +186,8 @@ class Skeleton:
         return other
 
 
+@brief
+@pictured
 @dataclass(frozen=True)
 class Clip:
     """One take: frame k is at k / fps seconds."""
@@ -207,6 +214,10 @@ class Clip:
     def seconds(self) -> float:
         return len(self) / self.fps
 
+    def facts(self) -> list[str]:
+        joints = f"{len(self.skeleton)} joints"
+        return [repr(self.name), f"{self.seconds:.2f} s at {self.fps:g} frames/s", joints]
+
 
 def _check_motion(motion: Clip | ClipSet, what: str) -> int:
     """Check poses and freeze them: their number. Errors: as a clip's."""
@@ -219,6 +230,8 @@ def _check_motion(motion: Clip | ClipSet, what: str) -> int:
     return frames
 
 
+@brief
+@pictured
 @dataclass(frozen=True)
 class ClipSet:
     """Clips of one skeleton at one rate, end to end."""
@@ -248,6 +261,11 @@ class ClipSet:
     @property
     def seconds(self) -> float:
         return len(self) / self.fps
+
+    def facts(self) -> list[str]:
+        clips = f"{len(self.names)} clips" if len(self.names) != 1 else repr(self.names[0])
+        joints = f"{len(self.skeleton)} joints"
+        return [clips, f"{self.seconds:.1f} s at {self.fps:g} frames/s", joints]
 
     def clip(self, index: int) -> Clip:
         a, b = self.clip_start[index], self.clip_start[index + 1]

@@ -16,6 +16,7 @@ from kumite.annotate.contacts import Contacts
 from kumite.annotate.kinds import KindSettings, find_kind, find_trajectories, strike_directions
 from kumite.annotate.segments import Cut, CutSettings, find_cuts, find_motion
 from kumite.annotate.strikes import Strikes
+from kumite.brief import brief
 from kumite.checks import freeze, names, rising
 from kumite.clip import LIMBS, ClipSet
 from kumite.errors import KumiteError
@@ -35,6 +36,7 @@ DIRECTIONS_OF = {
 DIRECTIONS = tuple(way for ways in DIRECTIONS_OF.values() for way in ways)
 
 
+@brief
 @dataclass(frozen=True)
 class Actions:
     """Actions of a set of clips, end to end and in order (A of them)."""

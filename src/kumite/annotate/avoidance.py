@@ -31,6 +31,7 @@ from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 from kumite.annotate.actions import KINDS, Actions, find_actions
 from kumite.annotate.contacts import Contacts
 from kumite.annotate.strikes import find_strikes
+from kumite.brief import brief
 from kumite.checks import freeze, rising
 from kumite.clip import SIDES, ClipSet, runs
 from kumite.errors import KumiteError
@@ -43,6 +44,7 @@ CARRIED = 80.0  # percentile of the head's height: how high it is carried
 CALM = 30.0  # percentile of the trunk's speed below which a clip's guard is taken
 
 
+@brief
 @dataclass(frozen=True)
 class AvoidanceParts:
     """Intervals of a set of clips, in order and apart (P of them)."""

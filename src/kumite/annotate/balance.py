@@ -16,6 +16,7 @@ from kumite.annotate.contacts import Contacts
 from kumite.body import Body, lay_body
 from kumite.body.segments import foot_line
 from kumite.body.stance import stand
+from kumite.brief import brief
 from kumite.checks import freeze
 from kumite.clip import SIDES, ClipSet, Skeleton
 from kumite.errors import KumiteError
@@ -26,6 +27,7 @@ RAISED = 0.03  # m above a foot's lowest corner: what is higher does not touch t
 CORNERS = 6  # of a foot: heel, ball and toes, left and right of each
 
 
+@brief
 @dataclass(frozen=True)
 class Balance:
     """The centre of mass and its support, frame by frame."""

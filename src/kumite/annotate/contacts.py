@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kumite.brief import brief
 from kumite.checks import freeze, instance
 from kumite.clip import SIDES, ClipSet, runs
 from kumite.errors import KumiteError
@@ -18,6 +19,7 @@ from kumite.errors import KumiteError
 STANDING_PERCENTILE = 5.0  # of a joint's heights: low, but above the outliers
 
 
+@brief
 @dataclass(frozen=True)
 class Contacts:
     """When each foot supports the body."""

@@ -17,6 +17,7 @@ import numpy as np
 
 from kumite.annotate.actions import KINDS, Actions
 from kumite.annotate.contacts import Contacts, velocity
+from kumite.brief import brief
 from kumite.checks import fps, freeze, names
 from kumite.clip import SIDES, ClipSet, forward_kinematics, runs
 from kumite.errors import KumiteError, unknown
@@ -57,6 +58,7 @@ class CycleSettings:
     slack: float = 0.07  # s by which an end may be moved to where it looks more like the start
 
 
+@brief
 @dataclass(frozen=True)
 class Cycles:
     """M cycles. One plays frames start + 1 … stop, and ``stop`` looks like ``start``."""

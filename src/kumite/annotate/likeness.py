@@ -15,6 +15,7 @@ import numpy as np
 from kumite.annotate.contacts import Contacts, find_contacts
 from kumite.annotate.strikes import find_strikes
 from kumite.body import Body, lay_body
+from kumite.brief import brief
 from kumite.clip import LIMBS, SIDES, ClipSet, concatenate, forward_kinematics, tip_positions
 from kumite.kernels.overlap import overlaps
 from kumite.rotation import angle, conjugate, multiply, rotate
@@ -44,6 +45,7 @@ quick movements; ankles under the body's weight bend further. Ankle: + toes down
 of the trunk and + away from the other."""
 
 
+@brief
 @dataclass(frozen=True)
 class Likeness:
     """Measures of one set of clips. Percentiles are the 5th, 50th and 95th."""

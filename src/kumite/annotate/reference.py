@@ -19,6 +19,7 @@ import numpy as np
 from kumite.annotate.balance import Balance, find_balance
 from kumite.annotate.contacts import Contacts
 from kumite.annotate.strikes import Strikes
+from kumite.brief import brief
 from kumite.checks import freeze
 from kumite.clip import LEG_ROLES, SIDES, ClipSet
 from kumite.errors import KumiteError
@@ -28,6 +29,7 @@ LEGS = 4.0  # rad²: six joints of both legs that differ by 47° each: who ducks
 DEPARTED = 0.25  # of the farthest that a target goes from its start: there it has begun
 
 
+@brief
 @dataclass(frozen=True)
 class Reference:
     """The posture found in a target motion, and how it was."""

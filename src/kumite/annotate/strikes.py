@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kumite.annotate.contacts import velocity
+from kumite.brief import brief
 from kumite.checks import freeze, instance
 from kumite.clip import LIMBS, ClipSet, runs, tip_positions
 from kumite.errors import KumiteError
@@ -28,6 +29,7 @@ APART = 0.08  # s: no arm strikes twice within it
 FLOOR = 0.4  # m: a hand that goes lower reaches for the floor, it does not strike
 
 
+@brief
 @dataclass(frozen=True)
 class Strikes:
     """Effective hits of all clips: by frame and limb, and as one row a blow (X blows)."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kumite.body.segments import Body
+from kumite.brief import brief
 from kumite.errors import KumiteError
 from kumite.kernels import overlap as kernels
 from kumite.rotation import rotate
@@ -17,6 +18,7 @@ NO_PART = -1
 FARTHEST = 3.0  # m that any two people must go at most
 
 
+@brief
 @dataclass(frozen=True)
 class Apart:
     """What two bodies need to be apart."""

@@ -11,6 +11,7 @@ from kumite import rotation
 from kumite.body.boxer import make_surfaces
 from kumite.body.stance import Stance, stand
 from kumite.body.sweep import vertex_normals
+from kumite.brief import brief
 from kumite.clip import Skeleton
 from kumite.errors import KumiteError
 
@@ -18,6 +19,7 @@ ROLES = ("skin", "hair", "shirt", "shorts", "gloves", "shoes", "soles", "trim")
 """What a vertex is of; a palette gives each a colour. Vertices and faces are grouped by role."""
 
 
+@brief
 @dataclass(frozen=True)
 class BodyMesh:
     """A skin in the skeleton's rest pose: no joint turned, the root joint at the origin."""

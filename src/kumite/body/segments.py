@@ -16,6 +16,7 @@ from kumite.body.stance import (
     crown_and_chin,
     stand,
 )
+from kumite.brief import brief
 from kumite.clip import SIDES, Skeleton
 from kumite.errors import KumiteError, unknown
 
@@ -66,6 +67,7 @@ RADIUS = {
 }
 
 
+@brief
 @dataclass(frozen=True)
 class Body:
     """Tapered capsules, one a segment, each carried by a joint. A sphere has start == end."""

@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from kumite import toml
 from kumite.body.segments import Body, lay_body
+from kumite.brief import brief
 from kumite.clip import LIMBS, ClipSet, Skeleton
 from kumite.errors import KumiteError, unknown
 from kumite.files import writing
@@ -30,6 +31,7 @@ SWORD = "sword"
 _CARRIED = {"hand": ("forearm", "hand"), "foot": ("shin", "foot")}
 
 
+@brief
 @dataclass(frozen=True)
 class Spheres:
     """B spheres, each carried by a joint."""

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kumite.brief import brief
 from kumite.control.preparation import (
     Motions,
     PreparationPolicy,
@@ -32,6 +33,7 @@ WALK = "walk"  # how the labels of walks begin
 MOVES = 0.15  # m/s: who is slower stands
 
 
+@brief
 @dataclass(frozen=True)
 class Approach:
     """The motions that a library is approached with: M' rows, of its M cores."""

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from kumite.body import Spheres, limb_spheres
+from kumite.brief import brief
 from kumite.checks import freeze
 from kumite.clip import Skeleton, forward_kinematics
 from kumite.errors import KumiteError
@@ -27,6 +28,7 @@ NEAR = 2.0  # m from a character's root over the ground: only there an attack co
 GRAVITY = 9.81  # m/s²
 
 
+@brief
 @dataclass(frozen=True)
 class Attack:
     """I spheres at T times; between them they move in straight lines."""

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kumite.body import Spheres, lay_spheres
+from kumite.brief import brief
 from kumite.checks import instance
 from kumite.clip import SIDES
 from kumite.control.attack import Attack, packed
@@ -82,6 +83,7 @@ class Outcome:
     HIT = "hit"  # every candidate would be hit, or could not be timed
 
 
+@brief
 @dataclass(frozen=True)
 class Standing:
     """Where a character is: in a stretch of the table, or at rest in a state."""

@@ -43,6 +43,7 @@ import numpy as np
 from kumite.annotate import DIRECTIONS, KINDS, NO_LIMB, Actions
 from kumite.annotate.contacts import velocity
 from kumite.annotate.kinds import OUTWARD, UPWARD, strike_directions
+from kumite.brief import brief
 from kumite.checks import freeze
 from kumite.clip import LIMBS, ClipSet, tip_positions
 from kumite.errors import KumiteError, unknown
@@ -71,6 +72,7 @@ AT = "@"  # between the label and the place of one action: "jab@left_jabs:41"
 ANNOTATED = ("attack", "defence")
 
 
+@brief
 @dataclass(frozen=True)
 class Annotations:
     """What attacks hit and from where, what defences protect and against what; else nothing."""

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from kumite.brief import brief
 from kumite.control.policy import Policy, Tracks, frame_discount, reward_params
 from kumite.errors import KumiteError
 from kumite.graph import Library
@@ -67,6 +68,7 @@ class Temper:
             self.more[behaviour] = value
 
 
+@brief
 @dataclass(frozen=True)
 class Skill:
     """What all fighters of one library share: policies and the tracks of its actions."""

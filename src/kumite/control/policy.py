@@ -16,6 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
+from kumite.brief import brief
 from kumite.checks import freeze, instance, number, whole
 from kumite.clip import LIMBS
 from kumite.control.grid import TargetGrid, approach_grid, heading_grid, strike_grid
@@ -180,6 +181,7 @@ def strike(library: Library, **changes) -> Behaviour:
     return replace(found, farthest=float(max(blow, step)))
 
 
+@brief
 @dataclass(frozen=True)
 class Policy:
     """A solved behaviour: values of being in a state with the target at a grid point."""

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from kumite import files
+from kumite.brief import brief
 from kumite.errors import KumiteError
 from kumite.kernels import sarsa as kernels
 
@@ -34,6 +35,7 @@ MOST_PAIRS = 10_000_000  # states × actions: 12 bytes each, twice
 CURVE = ("changed", "mean_return", "steps", "motion_seconds", "given_up")
 
 
+@brief
 @dataclass(frozen=True)
 class Motions:
     """What a character may do on its way, at each level of preparation that may be chosen."""
@@ -378,6 +380,7 @@ class Learning:
         return self
 
 
+@brief
 @dataclass(frozen=True)
 class PreparationPolicy:
     """The motion and the level of preparation to choose, in every state."""

@@ -65,8 +65,9 @@ def moment_image(
     *,
     columns: int = COLUMNS,
     size: tuple[int, int] = SIZE,
+    timed: bool = True,
 ) -> np.ndarray:
-    """A picture [H, W, 3] uint8 with a cell for each moment."""
+    """A picture [H, W, 3] uint8 with a cell for each moment. timed: write when it was."""
     outfits = palettes(recording.names)
     poses = [_pose(recording, m.frame) for m in found]
     views = [_view(recording, m, pose[0]) for m, pose in zip(found, poses)]
@@ -78,7 +79,8 @@ def moment_image(
         camera = _camera(points, yaw, min(max(height, usual), WIDER * usual), size)
         picture = Image.fromarray(_draw(recording, moment, pose, camera, outfits))
         _mark(picture, moment, camera, outfits)
-        _write(picture, f"{moment.frame / recording.fps:.2f} s  {moment.text}")
+        if timed:
+            _write(picture, f"{moment.frame / recording.fps:.2f} s  {moment.text}")
         cells.append(np.asarray(picture))
     return sheet_of(cells, min(columns, len(cells)))
 
@@ -193,4 +195,6 @@ def _write(picture: Image.Image, text: str) -> None:
         font = ImageFont.load_default(size=size)
         if draw.textlength(text, font=font) < picture.width - 12:
             break
+    else:
+        text = text.partition("  ")[0]  # in a small cell: when, not what
     draw.text((6, 5), text, fill=(50, 54, 60), font=font)

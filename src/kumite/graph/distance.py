@@ -11,6 +11,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from kumite.brief import brief
 from kumite.clip import ClipSet
 from kumite.kernels import distance as kernels
 from kumite.rotation import conjugate, from_yaw, log, multiply, planar_apply
@@ -33,6 +34,7 @@ HEIGHT_WEIGHT = 3.0  # rad/m: 10 cm of pelvis height weigh as 0.3 rad
 VELOCITY_HORIZON = 0.1  # s: a difference in velocity counts as what it comes to in this time
 
 
+@brief
 @dataclass(frozen=True)
 class PoseFeatures:
     """What is compared, poses last and float32 for the kernels. P poses, D Euclidean features."""

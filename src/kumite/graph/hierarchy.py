@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kumite.annotate.cycles import Cycles
+from kumite.brief import brief
 from kumite.checks import freeze, names, number
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError
@@ -32,6 +33,7 @@ ENTRY, RETURN = 0.25, 0.4  # s by which a target's start and stop may be moved t
 ALIKE = 1.8  # rad: farther apart, and a target does not leave from a core or return to it
 
 
+@brief
 @dataclass(frozen=True)
 class Targets:
     """T target motions: frames start … stop of the set, the movement itself from ``mark`` on."""
@@ -80,6 +82,7 @@ def authored_targets(clips: ClipSet, truths: Sequence[Truth], fps: float) -> Tar
     return Targets(tuple(rows), *(np.array(column) for column in zip(*rows.values())))
 
 
+@brief
 @dataclass(frozen=True)
 class Hierarchy:
     """M cores, T targets, and how they hang together. Frames are of the set of clips."""

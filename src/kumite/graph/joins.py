@@ -12,6 +12,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from kumite.brief import brief
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError
 from kumite.graph.distance import joint_weights
@@ -21,6 +22,7 @@ from kumite.rotation import from_yaw, multiply, planar_apply
 _PIECE = 65536  # joins that are measured at once
 
 
+@brief
 @dataclass(frozen=True)
 class Jumps:
     """How far X joins jump."""

@@ -23,6 +23,7 @@ from kumite.annotate import (
     find_strikes,
     no_avoidance,
 )
+from kumite.brief import brief, pictured
 from kumite.checks import instance, mapping, number, text, whole
 from kumite.clip import ClipSet, Skeleton
 from kumite.errors import KumiteError
@@ -50,6 +51,8 @@ VERSION = 5
 _NO_PARTS = no_avoidance(np.zeros(1, np.int64))  # of clips that are not known yet
 
 
+@brief
+@pictured
 @dataclass(frozen=True)
 class Library:
     """Everything a controller and a scene need of the captured motion."""
@@ -92,6 +95,16 @@ class Library:
                 raise KumiteError("library: a stretch is not an action")
         if self.preparing is not None:
             self.preparing.check(self.clips, len(self.table.first))
+
+    def facts(self) -> list[str]:
+        level = self.report.get("level") or ("frames" if self.actions is None else "actions")
+        return [
+            f"level {level}",
+            *self.clips.facts(),
+            f"{len(self.strikes)} blows",
+            f"{self.table.states} states",
+            f"{self.table.actions} actions",
+        ]
 
     @property
     def action_of_stretch(self) -> np.ndarray:

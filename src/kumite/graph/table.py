@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kumite.brief import brief
 from kumite.checks import freeze, rising
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError
@@ -21,6 +22,7 @@ from kumite.graph.transitions import Transitions
 from kumite.rotation import planar_compose, planar_inverse
 
 
+@brief
 @dataclass(frozen=True)
 class ActionTable:
     """N states, A actions in CSR by state, L stretches."""

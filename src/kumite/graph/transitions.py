@@ -13,6 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from kumite.annotate import AvoidanceParts, Contacts
+from kumite.brief import brief
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError, unknown
 from kumite.graph.distance import PoseFeatures, pose_features, squared_distances
@@ -29,6 +30,7 @@ _MANY = 4000  # frames from which on only the best local minima are kept, by a g
 _ROOM = 4096  # first guess of local minima a task
 
 
+@brief
 @dataclass(frozen=True)
 class Transitions:
     """X transitions: frame ``source`` may be followed by frame ``target``."""

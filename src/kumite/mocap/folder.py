@@ -15,6 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from kumite.brief import brief
 from kumite.clip import ROLES, Clip, ClipSet, concatenate, resample
 from kumite.errors import KumiteError, unknown
 from kumite.mocap import infer
@@ -80,6 +81,7 @@ class ClipInfo:
     facts: tuple[Fact, ...]  # everything above that the file does not simply hold
 
 
+@brief
 @dataclass(frozen=True)
 class Loaded:
     """Clips in metres, Y up, the ground at y = 0; and what is known about each."""

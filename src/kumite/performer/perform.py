@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kumite.brief import brief
 from kumite.clip import Clip, mirror
 from kumite.errors import unknown
 from kumite.performer.moves import Style
@@ -15,6 +16,7 @@ from kumite.performer.take import perform_take, vary
 from kumite.performer.truth import Truth, mirrored_truth
 
 
+@brief
 @dataclass(frozen=True)
 class Performance:
     """Clips at 60 Hz and, for each, what is true of it."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kumite import checks
+from kumite.brief import brief
 from kumite.clip import Clip, forward_kinematics, tip_positions
 from kumite.errors import KumiteError
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from kumite.performer.take import Performed
 
 
+@brief
 @dataclass(frozen=True)
 class Strike:
     """A blow as it was authored."""
@@ -54,6 +56,7 @@ class Action:
             checks.whole(self.mark, "action: mark", least=0)
 
 
+@brief
 @dataclass(frozen=True)
 class Truth:
     """What is true of a clip."""

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from kumite import checks, files
+from kumite.brief import brief, pictured
 from kumite.clip import Clip, Skeleton
 from kumite.errors import KumiteError, unknown
 from kumite.scene.told import check_event, check_settings, check_whole
@@ -37,6 +38,8 @@ class Event:
         check_event(self.kind, self.data)
 
 
+@brief
+@pictured
 @dataclass(frozen=True)
 class Recording:
     """N characters on one skeleton over F frames."""
@@ -101,6 +104,12 @@ class Recording:
     @property
     def seconds(self) -> float:
         return len(self) / self.fps
+
+    def facts(self) -> list[str]:
+        who = ", ".join(self.names) if len(self.names) <= 4 else f"{len(self.names)} characters"
+        time = f"{self.seconds:.1f} s at {self.fps:g} frames/s"
+        things = [f"{len(self.objects)} objects"] if self.objects else []
+        return [repr(self.scene), who, time, *things, f"{len(self.events)} events"]
 
     def character(self, name: str) -> int:
         if name not in self.names:

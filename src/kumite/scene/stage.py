@@ -9,6 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
+from kumite.brief import brief
 from kumite.checks import instance
 from kumite.clip import Skeleton
 from kumite.scene.recording import Event, Recording
@@ -17,6 +18,7 @@ RADIUS = 0.1  # m of an object of which a recording does not say it
 OUT_OF_SIGHT = np.array([0.0, -50.0, 0.0])  # m, of an object that is not there now
 
 
+@brief
 @dataclass
 class SceneObject:
     """A thing in the scene that is no character: a ball to hit, with a size a box, or a line on

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from kumite import rotation
+from kumite.brief import brief
 from kumite.checks import freeze
 from kumite.clip import Skeleton, forward_kinematics
 
 
+@brief
 @dataclass(frozen=True)
 class Moment:
     """One body at one time, in the scene."""

@@ -16,6 +16,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from kumite.annotate.contacts import Contacts
 from kumite.annotate.cycles import Cycles, closed
+from kumite.brief import brief
 from kumite.checks import freeze
 from kumite.clip import (
     SIDES,
@@ -37,6 +38,7 @@ SIGMA = 0.15  # s, of the Gaussian filter of levels
 REACH = 2.0  # sigmas that the filter looks to either side: the rest is 5 % of the weight
 
 
+@brief
 @dataclass(frozen=True)
 class References:
     """R reference postures, each in the facing frame of its pose."""

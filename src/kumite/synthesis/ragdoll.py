@@ -27,6 +27,7 @@ from scipy.interpolate import CubicSpline
 
 from kumite import rotation
 from kumite.body import Body
+from kumite.brief import brief
 from kumite.checks import freeze
 from kumite.clip import SIDES, Skeleton, forward_kinematics
 from kumite.errors import KumiteError
@@ -79,6 +80,7 @@ class Tone:
 LIMP = Tone(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
+@brief
 @dataclass(frozen=True)
 class Pushed:
     """A motion of T frames after a blow, the first one frame after it."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kumite.brief import brief
 from kumite.checks import freeze
 from kumite.clip import ClipSet, Skeleton, facing_frame
 from kumite.errors import KumiteError
@@ -41,6 +42,7 @@ SPEED_SCALE = 1.0  # m/s
 DIRECTION_WEIGHT = 2.0
 
 
+@brief
 @dataclass(frozen=True)
 class Responses:
     """R places to enter a response, as seen from the facing frame there."""
