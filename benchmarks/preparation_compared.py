@@ -113,7 +113,7 @@ def fields(library: Library, preparation: str, runs: int, seed: int) -> SceneSet
     )
 
 
-def approach(library: Library, cache_at: Path, way: str, runs: int, seed: int) -> Approaches:
+def approach(library: Library, cache_at: Path | None, way: str, runs: int, seed: int) -> Approaches:
     """All approaches of a seed, in one way of preparing."""
     settings = fields(library, "ours" if way == PRINTED else way, runs, seed)
     learning = PreparationSettings() if way == PRINTED else None

@@ -102,6 +102,7 @@ def _few_states(library: Library, count: int = 6) -> Library:
     pick = np.array(
         (busy[: count // 2] + [k for k in range(len(t.first)) if k not in busy])[:count]
     )
+    pick = pick[np.argsort(t.last[pick])]
     every = np.arange(count, dtype=np.int32)
     table = ActionTable(
         t.last[pick],

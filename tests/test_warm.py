@@ -37,9 +37,10 @@ def test_kernels_are_compiled_once_in_processes(tmp_path: Path, monkeypatch: pyt
     small = sorted(known(), key=lambda row: len(row.types))[:4]
     monkeypatch.setattr("kumite.kernels.known.known", lambda: small)
     forget()
-    told: list[tuple[int, int]] = []
+    told: list[tuple[int, int, float]] = []
     assert warm.warm(progress=lambda *at: told.append(at), processes=2) == 4
-    assert told == [(n, 4) for n in range(5)]
+    assert [at[:2] for at in told] == [(n, 4) for n in range(5)]
+    assert told[0][2] == 0.0 and abs(told[-1][2] - 1.0) < 1e-9
     assert len(list(tmp_path.rglob("*.nbc"))) == 4
     assert warm.warm(progress=lambda *at: told.append(at)) == 0 and len(told) == 5
 

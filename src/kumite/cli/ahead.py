@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 WORTH_SHOWING = 6.0  # s of compiling ahead from which on a recorded fight is shown
 OF_COMPILING = 0.9  # share of all work
 REHEARSED = 2.0  # s of a scene that are run, so that all that it calls is compiled
-_COMPILING = re.compile(r"compiling (\d+) of (\d+)")
+_COMPILING = re.compile(r"([\d.]+) (compiling \d+ of \d+)")  # share of it, and what to say
 
 
 class Wanted(NamedTuple):
@@ -88,7 +88,7 @@ def _follow(wanted: Wanted, coming: Coming, tell: Callable[[str, float], None]) 
             said = line.strip() or said
             found = _COMPILING.fullmatch(said)
             if found:
-                share = OF_COMPILING * int(found[1]) / int(found[2])
+                share, said = OF_COMPILING * float(found[1]), found[2]
             tell(said, share)
     if process.returncode == 2:
         raise KumiteError(said.removeprefix("error: "))
@@ -118,7 +118,9 @@ def main() -> None:
     try:
         warm(
             [settings_of(wanted)],
-            lambda done, total: print(f"compiling {done} of {total}", flush=True),
+            lambda done, total, share: print(
+                f"{share:.3f} compiling {done} of {total}", flush=True
+            ),
             building=wanted.library is None,
         )
         _rehearse(live_scene(wanted), wanted.seed)

@@ -170,10 +170,10 @@ class Compiling:
         self._bars = bars
         self._number: int | None = None
 
-    def __call__(self, done: int, total: int) -> None:
+    def __call__(self, done: int, total: int, share: float) -> None:
         if self._number is None:
-            self._number = self._bars.add("compiling, only this once", total=total)
-        self._bars.update(self._number, done, note=f"{done} of {total}")
+            self._number = self._bars.add("compiling, only this once", total=1.0)
+        self._bars.update(self._number, share, note=f"{done} of {total}")
 
 
 class Training:

@@ -20,8 +20,8 @@ from kumite.kernels.blow import (
     squareness,
     swept_contact,
 )
-from kumite.kernels.character import begin, own_of, planar_point, show_part
-from kumite.kernels.jit import kernel, parallel_kernel, plugged
+from kumite.kernels.character import own_of, planar_point, show_part
+from kumite.kernels.jit import kernel, parallel_kernel
 from kumite.kernels.limb import turned
 from kumite.kernels.look_ahead import look_ahead, look_further
 from kumite.kernels.near import fill_hash, nearest
@@ -528,41 +528,27 @@ def advance_many(dt, played, grid, opponent, room, shapes, blows):
     return begun + _hit_many(opponent, shapes, blows)
 
 
-def _step(
-    who,
-    states,
-    dt,
-    horizon,
-    played,
-    grid,
-    actors,
-    minds,
-    moves,
-    behaviours,
-    choices,
-    room,
-    shapes,
-    blows,
-):
-    """:func:`advance` after who [W], in states [W], have chosen, all at once: one call a frame.
-
-    grid must hold where all stand.
+def _choose(who, states, place, grid, actors, minds, moves, behaviours, horizon, choices):
+    """Who [W], in states [W], choose, all at once; then, once more, those of two who face each
+    other and have chosen the same. grid must hold where all stand, place [K, 3].
     """
-    place = played.poses.root_position
-    for w in prange(who.shape[0]):
+    count = who.shape[0]
+    order = np.empty(count, dtype=np.int64)
+    for w in range(count):
         o = actors.opponent[who[w]]
         minds.beside[who[w]] = NOBODY if o == NOBODY else actors.frame[o]
-        decide_one(
-            who[w], states[w], place, grid, actors, minds, moves, behaviours, horizon, choices
-        )
-    for w in range(who.shape[0]):
-        if give_way(who[w], actors, minds, choices):
-            decide_one(
-                who[w], states[w], place, grid, actors, minds, moves, behaviours, horizon, choices
-            )
-    begin(who, choices.stretch, played)
-    return advance(dt, played, grid, actors.opponent, room, shapes, blows)
+        order[w] = w
+    for turn in range(2):
+        for n in prange(count):
+            k, state = who[order[n]], states[order[n]]
+            decide_one(k, state, place, grid, actors, minds, moves, behaviours, horizon, choices)
+        if turn == 0:
+            again = 0
+            for w in range(count):
+                if give_way(who[w], actors, minds, choices):
+                    order[again] = w
+                    again += 1
+            count = again
 
 
-step = plugged(_step, advance=advance)
-step_many = plugged(_step, parallel=True, advance=advance_many)  # on all cores
+choose, choose_many = kernel(_choose), parallel_kernel(_choose)

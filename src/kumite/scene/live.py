@@ -260,23 +260,22 @@ class LiveScene:
         who = cast.waiting
         states = np.searchsorted(self.library.table.state_frame, cast.stop[who])
         self.fighters.note(who)
-        run = kernels.step_many if cast.count >= MANY else kernels.step
-        happened = run(
-            who,
-            states,
-            1.0 / self.fps,
-            self._horizon,
-            cast.played,
-            floor.grid,
-            self._actors,
-            self.fighters.minds,
-            self.skill.moves,
-            self.skill.behaviours,
-            self.fighters.choices,
-            floor.room,
-            floor.shapes,
-            floor.blows,
-        )
+        if len(who):
+            choose = kernels.choose_many if cast.count >= MANY else kernels.choose
+            choose(
+                who,
+                states,
+                cast.root_position,
+                floor.grid,
+                self._actors,
+                self.fighters.minds,
+                self.skill.moves,
+                self.skill.behaviours,
+                self._horizon,
+                self.fighters.choices,
+            )
+            cast.begin(who, self.fighters.choices.stretch)
+        happened = floor.advance()
         self._note_decisions(who, states)
         self.frame += 1
         if happened:
