@@ -7,6 +7,9 @@ BIN := .venv/bin
 RUN := .venv/.ready-to-run
 DEV := .venv/.ready-to-test
 
+# uv leaves it to the first start to compile what Python reads; kept, every other is 2 s shorter.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo test fuzz fast lint bench lock recording clean
 
 demo: $(RUN)

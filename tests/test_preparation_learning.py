@@ -8,7 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kumite import files
 from kumite.control.preparation import (
+    KIND,
+    LEARNING,
+    VERSION,
     Learning,
     Motions,
     PreparationSettings,
@@ -343,6 +347,35 @@ def test_it_is_found_again_by_content(tmp_path):
         path.write_bytes(b"damaged")
     assert (trained_preparation(motions, tmp_path, SMALL).best == first.best).all()
     assert (trained_preparation(motions, None, SMALL).best == first.best).all()
+
+
+@pytest.mark.parametrize("name, wrong", [("best", 10**6), ("best", -1), ("class_after", 99)])
+def test_forged_policies_are_learned_again(tmp_path, name: str, wrong: int):
+    motions = walker(settings=SMALL)
+    first = trained_preparation(motions, tmp_path, SMALL)
+    (path,) = tmp_path.glob("*.policy")
+    header, arrays = files.load(path, KIND, VERSION)
+    arrays[name] = arrays[name].copy()
+    arrays[name].flat[0] = wrong
+    files.save(path, KIND, VERSION, header, arrays)
+    assert (trained_preparation(motions, tmp_path, SMALL).best == first.best).all()
+    assert (files.load(path, KIND, VERSION)[1]["best"] == first.best).all()
+    with pytest.raises(KumiteError, match=name):
+        replace(first, **{name: arrays[name]})
+
+
+@pytest.mark.parametrize("name", ["q", "visits", "best", "untried", "curve"])
+def test_forged_learning_is_refused(tmp_path, name: str):
+    motions, path = walker(settings=SMALL), tmp_path / "kept.learning"
+    learning = Learning(motions, SMALL)
+    learning.batch()
+    learning.save(path)
+    header, arrays = files.load(path, LEARNING, VERSION)
+    arrays[name] = arrays[name].copy()
+    arrays[name].flat[0] = np.nan if arrays[name].dtype.kind == "f" else -(10**6)
+    files.save(path, LEARNING, VERSION, header, arrays)
+    with pytest.raises(KumiteError, match="damaged"):
+        Learning.load(path, motions, SMALL)
 
 
 def test_decisions_come_from_the_cell_that_is_seen():

@@ -25,6 +25,7 @@ import numpy as np
 
 from kumite import files
 from kumite.brief import brief
+from kumite.checks import array, freeze, instance, number
 from kumite.errors import KumiteError
 from kumite.kernels import sarsa as kernels
 
@@ -267,6 +268,9 @@ class Curve:
     motion_seconds: np.ndarray  # [B] s of motion an episode
     given_up: np.ndarray  # [B] episodes that did not come to the goal
 
+    def __post_init__(self) -> None:
+        freeze(self, "learning curve", **dict.fromkeys(CURVE, (float, ("B",))))
+
     def __len__(self) -> int:
         return len(self.changed)
 
@@ -371,13 +375,31 @@ class Learning:
         header, arrays = files.load(path, LEARNING, VERSION)
         if header.get("key") != _key(motions, self.settings, seed):
             raise KumiteError(f"{path}: learned with other motions, settings, seed or code")
-        for name, array in self.learner._asdict().items():
+        for name, held in self.learner._asdict().items():
             found = arrays.get(name)
-            if found is None or found.shape != array.shape or found.dtype != array.dtype:
+            if found is None or found.shape != held.shape or found.dtype != held.dtype:
                 raise KumiteError(f"{path}: damaged {LEARNING} ({name})")
-            array[...] = found
-        self._rows = tuple(tuple(row) for row in arrays["curve"].tolist())
+            held[...] = found
+        if not (self._fits() and np.isfinite(self.learner.q).all()):
+            raise KumiteError(f"{path}: damaged {LEARNING} (numbers out of range)")
+        try:
+            self._rows = tuple(map(tuple, np.reshape(arrays["curve"], (-1, len(CURVE))).tolist()))
+            _ = self.curve
+        except (KeyError, ValueError, KumiteError):
+            raise KumiteError(f"{path}: damaged {LEARNING} (curve)") from None
         return self
+
+    def _fits(self) -> bool:
+        """Whether kernels may follow what has been learned."""
+        best, visits, untried = self.learner.best, self.learner.visits, self.learner.untried
+        allowed = _allowed(self.process, self.learner.q.shape[1])
+        of_class = np.repeat(np.arange(len(allowed)), self.states // len(allowed))
+        return bool(
+            np.all((best >= 0) & (best < allowed.shape[1]))
+            and allowed[of_class, best].all()
+            and np.all(visits >= 0)
+            and np.array_equal(untried, (allowed[of_class] & (visits == 0)).sum(axis=1))
+        )
 
 
 @brief
@@ -391,6 +413,18 @@ class PreparationPolicy:
     curve: Curve
     converged: bool  # by the rule, not only because batches ran out
     seconds: float  # that learning took
+
+    def __post_init__(self) -> None:
+        what = "preparation policy"
+        instance(self.settings, PreparationSettings, f"{what}: settings")
+        instance(self.curve, Curve, f"{what}: curve")
+        instance(self.converged, bool, f"{what}: converged")
+        number(self.seconds, f"{what}: seconds", least=0.0)
+        freeze(self, what, best=(np.int32, ("C", "L", "G", "I")), class_after=(np.int32, ("M",)))
+        actions = len(self.class_after) * self.settings.levels
+        # Kernels follow these numbers without looking.
+        for name, most in (("best", actions - 1), ("class_after", len(self.best) - 1)):
+            array(getattr(self, name), f"{what}: {name}", (...,), np.int32, least=0, most=most)
 
     def decide(
         self, last: Any, level: Any, d_g: Any, theta_g: Any, d_i: Any, theta_i: Any
@@ -490,7 +524,7 @@ def trained_preparation(
     key = hashlib.sha256(f"{_key(motions, settings, seed)} {most_batches}".encode()).hexdigest()
     path = None if folder is None else Path(folder) / f"preparation-{key[:16]}.policy"
     if path is not None and path.exists():
-        with contextlib.suppress(KumiteError, KeyError, TypeError):
+        with contextlib.suppress(*files.UNREADABLE):
             return _read(path, settings, build_process(motions, settings))
     policy = train(
         motions,
@@ -519,7 +553,20 @@ def _read(path: Path, settings: PreparationSettings, process: kernels.Process) -
     if best.shape != (classes, len(process.level), goals, sources):
         raise KumiteError(f"{path}: damaged {KIND}")
     curve = Curve(*(arrays[name] for name in CURVE))
-    return PreparationPolicy(settings, best, arrays["class_after"], curve, **header)
+    found = PreparationPolicy(settings, best, arrays["class_after"], curve, **header)
+    allowed = _allowed(process, len(found.class_after) * settings.levels)
+    fits = [allowed[c, found.best[c]].all() for c in range(classes)]
+    if not (all(fits) and np.array_equal(found.class_after, process.class_after)):
+        raise KumiteError(f"{path}: damaged {KIND}")
+    return found
+
+
+def _allowed(process: kernels.Process, actions: int) -> np.ndarray:
+    """Which actions [C, U] may follow a motion of each class."""
+    allowed = np.zeros((len(process.choice_start) - 1, actions), dtype=bool)
+    of_class = np.repeat(np.arange(len(allowed)), np.diff(process.choice_start))
+    allowed[of_class, process.choice] = True
+    return allowed
 
 
 def _key(motions: Motions, settings: PreparationSettings, seed: int) -> str:
@@ -527,6 +574,6 @@ def _key(motions: Motions, settings: PreparationSettings, seed: int) -> str:
     h = hashlib.sha256(files.code_digest("control", "kernels").encode())
     finite = {k: str(v) for k, v in asdict(settings).items()}
     h.update(json.dumps([list(motions.names), finite, seed], sort_keys=True).encode())
-    for array in (motions.displacement, motions.duration, motions.follows):
-        h.update(f"{array.dtype} {array.shape}".encode() + np.ascontiguousarray(array).tobytes())
+    for of in (motions.displacement, motions.duration, motions.follows):
+        h.update(f"{of.dtype} {of.shape}".encode() + np.ascontiguousarray(of).tobytes())
     return h.hexdigest()
