@@ -136,6 +136,7 @@ def test_what_is_learned_is_kept_and_taken_up_again(library: Library, tmp_path: 
 
 
 def test_train_learns_keeps_and_goes_on(run, library, tmp_path: Path, monkeypatch):
+    monkeypatch.setattr("kumite.cli.progress.INTERVALS", (0.0,))  # every batch is told
     path = tmp_path / "p.kumite"
     save_library(path, library)
     code, text, err = run("train", path, "--most-batches", 3, "--seed", 201)
