@@ -327,7 +327,10 @@ WHOLE = ["build", "still.bvh", "-o", "x.kumite", "--level", "actions"]
         (["studio", "BUILT"], "a library of frames, without actions; expected one built with"),
         (["studio", "BUILT", "--count", "3"], "--count: of a scene"),
         (["studio", "none.kumite"], "none.kumite: cannot be read"),
-        (["build", "still.bvh", "-o", "x.kumite", "--fps", "1e9"], "at most 100000 frames a second"),
+        (
+            ["build", "still.bvh", "-o", "x.kumite", "--fps", "1e9"],
+            "at most 100000 frames a second",
+        ),
         (
             ["run", "sparring", "-l", "BUILT", "--seconds", "1e9"],
             "seconds: 1e+09, expected at most",

@@ -223,7 +223,8 @@ def found_by(made: DodgeScene, paths: list[tuple[int, ...]]) -> Avoidance:
     now = made.frame / made.fps
     plan = Plan(paths[0], 0, now, np.array([0.0, 30.0]), np.array([0.0, 1.0]))
     others = tuple((p, 0) for p in paths[1:])
-    return Avoidance(Outcome.FOUND, paths[0], 0, 0.5, plan=plan, others=others)
+    told = {"cost": 0.5, "costs": (0.2, 0.2, 0.1), "distance": 0.1, "before": -0.1}
+    return Avoidance(Outcome.FOUND, paths[0], 0, 0.5, **told, plan=plan, others=others)
 
 
 @pytest.mark.parametrize("fits", [True, False])

@@ -172,6 +172,12 @@ def _preparation_lines(library: Library) -> list[str]:
         )
         if not preparing.found[t]:
             lines.append(f"{label}: no frame fits, its first frame is taken")
+    for label in library.report.get("targets_over_bound", ()):
+        what = "kept, as it is marked" if label in targets.label else "left out"
+        lines.append(
+            f"{label}: its way in or out jumps farther than the bound (--join-angle, "
+            f"--join-height, --join-speed): {what}"
+        )
     return lines
 
 

@@ -302,7 +302,14 @@ def _preparation(
     else:
         targets, cycles = marked_targets(clips, contacts, marked)
     return build_preparation_library(
-        clips, targets, cycles, **given, contacts=contacts, strikes=strikes, progress=stages
+        clips,
+        targets,
+        cycles,
+        **given,
+        keep_all=marked is not None,
+        contacts=contacts,
+        strikes=strikes,
+        progress=stages,
     )
 
 

@@ -43,6 +43,7 @@ def build_preparation_library(
     alike: float = ALIKE,
     threshold: float = LEGS,
     bound: JoinBound | None = None,
+    keep_all: bool = False,
     contacts: Contacts | None = None,
     strikes: Strikes | None = None,
     progress: Callable[[str], None] = lambda stage: None,
@@ -53,8 +54,9 @@ def build_preparation_library(
     [rad²]: see :func:`build_hierarchy` and :func:`find_reference`. A target is entered up to its
     reference posture, and left from where what it is about is over. bound: the farthest that a join
     may jump; None: the usual (:class:`JoinBound`): a target whose best way in or out jumps farther
-    is left out. contacts, strikes: of these clips, if they are known. Errors: no targets, no
-    cycles; frames that are no part of one clip; limits out of range.
+    is left out, unless ``keep_all`` (for targets that a person has marked). contacts, strikes: of
+    these clips, if they are known. Errors: no targets, no cycles; frames that are no part of one
+    clip; limits out of range.
     """
     if len(targets) == 0:
         raise KumiteError("no target motion; expected at least one to prepare for")
@@ -96,13 +98,13 @@ def build_preparation_library(
     hierarchy = hierarchy_of(targets)
     fits = _fits(clips, hierarchy, bound)
     over = [label for label, fit in zip(targets.label, fits.tolist()) if not fit]
-    if len(over) == count:
+    if len(over) == count and not keep_all:
         raise KumiteError(
             f"none of {count} target motion(s) joins a cycle within the bound; expected at most "
             f"{bound.height:g} m (--join-height), {bound.angle:g} rad (--join-angle) and "
             f"{bound.speed:g} m/s (--join-speed) for one"
         )
-    if over:
+    if over and not keep_all:
         kept = np.flatnonzero(fits)
         targets, reference, count = targets.take(kept), reference[kept], len(kept)
         references, about = [references[t] for t in kept], [about[t] for t in kept]

@@ -86,7 +86,10 @@ def _fight(recording: Recording, events: Events) -> Report | None:
             "landed": len(landed),
             "blocked": len(mine) - len(landed),
             "taken": len([e for e in taken if not e.data.get("blocked")]),
-            "fastest m/s": max((round(float(e.data["speed"]), 2) for e in landed), default=None),
+            "fastest m/s": max(
+                (round(float(e.data["speed"]), 2) for e in landed if "speed" in e.data),
+                default=None,
+            ),
         }
         if reactions or run_over:
             falls = len(_where(_of(reactions, name), size="fall"))
