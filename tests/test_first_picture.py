@@ -160,6 +160,8 @@ def test_a_first_start_shows_the_recorded_fight_and_ends_cleanly(tmp_path: Path)
         text=True,
         env=environment,
         start_new_session=True,
+        # Whatever starts the tests may ignore Ctrl-C, as background jobs of a shell do.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     assert studio.stdout is not None
     said = [studio.stdout.readline(), studio.stdout.readline()]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from kumite.annotate import DIRECTIONS, KINDS, NO_LIMB
+from kumite.body.palette import main_colours
 from kumite.clip import LIMBS, facing_frame, forward_kinematics
 from kumite.errors import KumiteError
 from kumite.graph import Library
@@ -192,5 +193,7 @@ def test_a_click_plays_an_action(whole: Library):
         patch = browser.around(
             browser.picture(page), browser.project(place, client.camera, page), 25
         ).astype(int)
-        assert ((patch[..., 0] - patch[..., 2]) > 40).mean() > 0.3  # the red corner's shirt
+        (shirt,) = main_colours(stage.names)
+        strong, weak = int(np.argmax(shirt)), int(np.argmin(shirt))
+        assert ((patch[..., strong] - patch[..., weak]) > 40).mean() > 0.3
         assert traffic.errors == []
