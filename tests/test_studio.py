@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import itertools
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 import numpy as np
 import psutil
@@ -19,28 +16,7 @@ from kumite.scene import LiveScene, Playback, load_scene, record
 from kumite.studio import Studio, serve, wording
 from kumite.studio.pace import Pace
 from tests import browser
-
-
-@contextmanager
-def running(studio: Studio) -> Iterator[Studio]:
-    thread = threading.Thread(target=studio.run, daemon=True)
-    thread.start()
-    try:
-        yield studio
-    finally:
-        studio.stop()
-        thread.join(10)
-        studio.close()
-        assert not thread.is_alive()
-
-
-def wait(condition, seconds: float = 20.0) -> bool:
-    end = time.perf_counter() + seconds
-    while not condition():
-        if time.perf_counter() > end:
-            return False
-        time.sleep(0.02)
-    return True
+from tests.stranger import running, wait
 
 
 def live(library: Library, scene: str, seed: int = 1) -> LiveScene:
