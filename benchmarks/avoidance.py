@@ -30,8 +30,9 @@ from kumite.graph import Library, build_avoidance_library, builtin_library
 from kumite.kernels import avoid as kernels
 from kumite.rotation import planar_apply
 from kumite.scene import load_scene
-from kumite.scene.balls import BallsSettings, aimed
-from kumite.scene.dodge import AIM_SPREAD, DodgersSettings, DodgeScene, DodgeSettings
+from kumite.scene.balls import aimed
+from kumite.scene.dodge import AIM_SPREAD, DodgeScene
+from kumite.scene.settings_dodge import BallsSettings, DodgersSettings, DodgeSettings
 
 SEED = 20110
 THROWS, FEW_THROWS = 1000, 60

@@ -27,9 +27,9 @@ from kumite.graph import Library, builtin_library, load_library
 from kumite.graph.preparing import KINDS
 from kumite.rotation import angle, conjugate, log, multiply, rotate
 from kumite.scene import PrepareScene
-from kumite.scene.errands import PrepareSettings, TargetSettings, WalkerSettings
 from kumite.scene.metrics import foot_skate, source_skate
 from kumite.scene.settings import SceneSettings
+from kumite.scene.settings_prepare import PrepareSettings, TargetSettings, WalkerSettings
 from kumite.scene.walkers import ON_THE_WAY, headless
 
 SEED = 300

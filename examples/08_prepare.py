@@ -1,7 +1,7 @@
 """Somebody who prepares for a kick on the way to the ball, and who does not: what differs."""
 
 from kumite import PrepareScene, builtin_library, load_scene
-from kumite.scene.errands import PrepareSettings
+from kumite.scene.settings_prepare import PrepareSettings
 
 library = builtin_library(None, style="targets", level="preparation")
 for preparation in ("none", "ours"):

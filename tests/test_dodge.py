@@ -18,10 +18,16 @@ from kumite.control.avoidance import Avoidance, AvoidanceSearch, Outcome, Plan
 from kumite.errors import KumiteError
 from kumite.graph import build_avoidance_library, find_avoiding_transitions
 from kumite.scene import dodgers
-from kumite.scene.balls import Balls, BallsSettings, capsules_of, velocity_to
-from kumite.scene.dodge import DodgerSettings, DodgersSettings, DodgeScene, DodgeSettings
+from kumite.scene.balls import Balls, capsules_of, velocity_to
+from kumite.scene.dodge import DodgeScene
 from kumite.scene.dodgers import _after
 from kumite.scene.settings import SceneSettings
+from kumite.scene.settings_dodge import (
+    BallsSettings,
+    DodgerSettings,
+    DodgersSettings,
+    DodgeSettings,
+)
 from tests import toys
 from tests.dodging import FPS, few
 

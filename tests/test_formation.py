@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from kumite.errors import KumiteError
 from kumite.scene import BoutScene, SceneSettings, load_scene, with_count
-from kumite.scene.formation import APART, PairsSettings
+from kumite.scene.settings_pairs import APART, PairsSettings
 from tests.shared import builtin
 
 SIDES = {"one": {"name": "red"}, "other": {"name": "blue"}}

@@ -14,7 +14,8 @@ from kumite.clip import Skeleton
 from kumite.errors import KumiteError
 from kumite.performer import skeleton as figure
 from kumite.scene import DodgeScene, load_scene
-from kumite.scene.dodge import DodgeSettings
+from kumite.scene.dodgers import volume_of
+from kumite.scene.settings_dodge import DodgeSettings
 from tests import dodging, toys
 
 
@@ -150,4 +151,4 @@ def test_a_scene_takes_an_edited_file(tmp_path):
     assert np.allclose(scene.search.spheres.radius, laid.radius + 0.05, atol=1e-4)
     missing = DodgeSettings(spheres=str(tmp_path / "none.toml"), index=False)
     with pytest.raises(KumiteError, match=r"none\.toml"):
-        missing.body_volume(skeleton)
+        volume_of(missing, skeleton)

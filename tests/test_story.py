@@ -24,7 +24,8 @@ from kumite.scene import (
     save_recording,
 )
 from kumite.scene.look import car
-from kumite.scene.story import BRAKE, CLEAR, CueSettings, Story, Vehicle, VehicleSettings
+from kumite.scene.settings_fight import CueSettings, VehicleSettings
+from kumite.scene.story import BRAKE, CLEAR, Story, Vehicle
 from tests.shared import builtin
 
 FPS = 60.0

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from kumite.annotate import DIRECTIONS, KINDS, NO_LIMB, Actions
-from kumite.annotate.actions import DIRECTIONS_OF
+from kumite.annotate.vocabulary import DIRECTIONS_OF
 from kumite.control.styles import NAMES, STYLES, Style, short_range, style
 from kumite.errors import KumiteError
 from kumite.kernels import style as columns

@@ -23,8 +23,8 @@ from kumite.rotation import (
     wrap_angle,
 )
 from kumite.scene import PrepareScene
-from kumite.scene.errands import TargetSettings
 from kumite.scene.settings import SceneSettings
+from kumite.scene.settings_prepare import TargetSettings
 from kumite.scene.things import MASS_RATIO, Things
 from kumite.scene.walkers import OFF, Walkers
 from tests.shared import builtin

@@ -67,7 +67,8 @@ def _dodging() -> Any:
     """A search, and throws at who is at the beginning of a stretch."""
     from kumite.control.attack import thrown
     from kumite.control.avoidance import AvoidanceSearch, Standing
-    from kumite.scene.balls import BallsSettings, aimed
+    from kumite.scene.balls import aimed
+    from kumite.scene.settings_dodge import BallsSettings
 
     library = sixteen()
     search, rng, asked = AvoidanceSearch(library), np.random.default_rng(20110), []

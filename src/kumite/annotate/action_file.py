@@ -53,8 +53,9 @@ from kumite.annotate.action_lines import (
     parse,
     quoted,
 )
-from kumite.annotate.actions import DIRECTIONS, DIRECTIONS_OF, KINDS, NO_LIMB, Actions
+from kumite.annotate.actions import Actions
 from kumite.annotate.avoidance import AvoidanceParts
+from kumite.annotate.vocabulary import DIRECTIONS, DIRECTIONS_OF, KINDS, NO_LIMB
 from kumite.clip import LIMBS, ClipSet, runs
 from kumite.errors import at, unknown
 

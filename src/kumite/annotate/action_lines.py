@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from kumite.annotate.actions import DIRECTIONS_OF, KINDS
+from kumite.annotate.vocabulary import DIRECTIONS_OF, KINDS
 from kumite.clip import LIMBS
 from kumite.errors import KumiteError, at, unknown
 from kumite.mocap import text

@@ -19,8 +19,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kumite.annotate.actions import KINDS, Actions
+from kumite.annotate.actions import Actions
 from kumite.annotate.avoidance import AvoidanceParts
+from kumite.annotate.vocabulary import KINDS
 from kumite.clip import ClipSet
 from kumite.performer import Truth
 

@@ -16,24 +16,11 @@ from kumite.annotate.contacts import Contacts
 from kumite.annotate.kinds import KindSettings, find_kind, find_trajectories, strike_directions
 from kumite.annotate.segments import Cut, CutSettings, find_cuts, find_motion
 from kumite.annotate.strikes import Strikes
+from kumite.annotate.vocabulary import DIRECTIONS, DIRECTIONS_OF, KINDS, NO_LIMB
 from kumite.brief import brief
 from kumite.checks import freeze, names, rising
 from kumite.clip import LIMBS, ClipSet
 from kumite.errors import KumiteError
-
-KINDS = ("attack", "defence", "transition", "reaction", "idle")
-NO_LIMB = -1
-"""The limb of an action in which none strikes. A sword strikes with the hand that holds it: its
-direction is slash or thrust."""
-DIRECTIONS_OF = {
-    "attack": ("straight", "hook", "uppercut", "kick", "slash", "thrust"),
-    "defence": ("duck", "slip", "sway", "block", "jump back"),
-    "transition": ("forward", "back", "left", "right", "turn left", "turn right", "up"),
-    "reaction": ("hit", "fall"),
-    "idle": ("none",),
-}
-"""The ways of each kind."""
-DIRECTIONS = tuple(way for ways in DIRECTIONS_OF.values() for way in ways)
 
 
 @brief

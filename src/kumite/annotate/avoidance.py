@@ -28,9 +28,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
-from kumite.annotate.actions import KINDS, Actions, find_actions
+from kumite.annotate.actions import Actions, find_actions
 from kumite.annotate.contacts import Contacts
 from kumite.annotate.strikes import find_strikes
+from kumite.annotate.vocabulary import KINDS
 from kumite.brief import brief
 from kumite.checks import freeze, rising
 from kumite.clip import SIDES, ClipSet, runs

@@ -15,8 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kumite.annotate.actions import KINDS, Actions
+from kumite.annotate.actions import Actions
 from kumite.annotate.contacts import Contacts, velocity
+from kumite.annotate.vocabulary import KINDS
 from kumite.brief import brief
 from kumite.checks import fps, freeze, names
 from kumite.clip import SIDES, ClipSet, forward_kinematics, runs

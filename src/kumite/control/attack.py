@@ -16,6 +16,7 @@ from kumite.body import Spheres, limb_spheres
 from kumite.brief import brief
 from kumite.checks import freeze
 from kumite.clip import Skeleton, forward_kinematics
+from kumite.control.rules import GRAVITY
 from kumite.errors import KumiteError
 from kumite.kernels.avoid import Attacks
 
@@ -25,7 +26,6 @@ FASTEST = 400.0  # m/s: faster is no attack but a mistake
 SMALLEST, LARGEST = 0.005, 2.0  # m, radii
 LONGEST = 600.0  # s
 NEAR = 2.0  # m from a character's root over the ground: only there an attack counts
-GRAVITY = 9.81  # m/s²
 
 
 @brief

@@ -22,6 +22,7 @@ from kumite.brief import brief
 from kumite.checks import instance
 from kumite.clip import SIDES
 from kumite.control.attack import Attack, packed
+from kumite.control.rules import AvoidanceRules
 from kumite.control.volumes import joins_of, volumes_of
 from kumite.errors import KumiteError, unknown
 from kumite.graph import Library
@@ -35,41 +36,6 @@ END_EFFECTORS = tuple(f"{side}_{part}" for part in ("hand", "foot") for side in 
 MOST_OTHERS = 32  # next best paths that are told
 TUNABLE = ("window", "weights", "enough", "far", "most", "clearance", "wide", "ahead")
 MOST_PATHS = 50_000  # candidates of one search; what comes after them is not weighed
-
-
-@dataclass(frozen=True)
-class AvoidanceRules:
-    """The paper's numbers, by its names in the comments, and ours."""
-
-    window: float = 1.0  # s, T_window: how far the avoidance may be from the attack as captured
-    weights: tuple[float, float, float] = (1.0, 1.0, 1.0)  # w_a, w_b, w_t
-    enough: float = 0.5  # m s, E_avoidance
-    far: float = 1.0  # m, D_body, which the paper does not give
-    most: float = 4.0  # E_time
-    fast: float = 0.3  # m/s, V_fast: faster edges may be slowed down
-    slow: float = 0.1  # m/s, V_slow: slower edges may be sped up
-    still: float = 0.0  # m/s, V_still: those no faster either way
-    clearance: float = 0.02  # m between attack and body, the paper's 0
-    left: float = 0.05  # m by which a part of the body must have moved to have left its place
-    ramp: float = 0.2  # s in which a change of speed comes and goes
-    wide: float = 0.10  # m at which an attack passes by and nothing is done about it
-    ahead: float = 2.0  # s before an attack's middle from which avoiding it is thought about
-    horizon: float = 1.5  # s to which the index looks ahead
-    joins: bool = True  # whether what joins leave is reckoned with
-    index: bool = True
-    culling: bool = True
-
-    def __post_init__(self) -> None:
-        for name in ("window", "enough", "far", "ahead", "horizon", "ramp"):
-            if not 0 < getattr(self, name) < 100:
-                raise KumiteError(f"avoidance: {name} {getattr(self, name)}; expected above 0")
-        for name in ("clearance", "left", "wide", "fast", "slow", "still"):
-            if not 0 <= getattr(self, name) < 100:
-                raise KumiteError(f"avoidance: {name} {getattr(self, name)}; expected at least 0")
-        if len(self.weights) != 3 or min(self.weights) < 0 or not np.isfinite(self.weights).all():
-            raise KumiteError("avoidance: weights: expected three numbers, none below 0")
-        if not 1 <= self.most <= 16:
-            raise KumiteError(f"avoidance: most {self.most}; expected from 1 to 16")
 
 
 class Outcome:

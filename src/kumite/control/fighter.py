@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from kumite.brief import brief
 from kumite.control.policy import Policy, Tracks, frame_discount, reward_params
-from kumite.errors import KumiteError
+from kumite.control.rules import Temper
 from kumite.graph import Library
 from kumite.kernels import crowd as kernels
 from kumite.kernels import policy as kernels_policy
@@ -18,54 +18,6 @@ from kumite.kernels.blow import NOBODY
 from kumite.kernels.look_ahead import Behaviours, Moves
 
 IN_STEP = 0.2  # s: of two who face each other none begins what the other began so shortly before
-
-
-@dataclass
-class Temper:
-    """How a fighter chooses. All of it may be changed while the scene runs."""
-
-    approach: float = 1.0  # weight of bringing blows' reach over the target
-    strike: float = 6.0  # weight of hitting it
-    facing: float = 3.5  # how much turning away from it meanwhile cuts an action's worth
-    few: int = 3  # how many of the best actions are drawn from
-    slack: float = 0.2  # how much less an action may gain than the best one, as a share of that
-    boredom: float = 0.5  # how much of its gain an action loses while it was used recently
-    memory: int = 6  # how many actions back "recently" goes
-    again: int = 4  # how many of the best actions are weighed once more, a step further ahead
-    personal_space: float = 0.7  # m between the bodies that an action must leave
-    more: dict[str, float] = field(default_factory=dict)  # weights of other behaviours, by name
-
-    def __post_init__(self) -> None:
-        self._check_weights()
-        if self.few < 1 or self.again < 1 or self.memory < 0:
-            raise KumiteError("few, again: expected at least 1; memory: at least 0")
-
-    def _check_weights(self) -> None:
-        every = [self.approach, self.strike, *self.more.values()]
-        if not np.isfinite(every).all() or min(every) < 0 or sum(every) == 0:
-            raise KumiteError("weights: expected none below 0, and not all 0")
-
-    def weight(self, behaviour: str) -> float:
-        """The weight of a behaviour by name."""
-        if behaviour in ("approach", "strike"):
-            return float(getattr(self, behaviour))
-        return self.more.get(behaviour, 0.0)
-
-    def set_weight(self, behaviour: str, value: float) -> None:
-        """Another weight, from the next decision on. Errors: below 0; all would be 0."""
-        before = self.weight(behaviour)
-        self._put(behaviour, value)
-        try:
-            self._check_weights()
-        except KumiteError:
-            self._put(behaviour, before)
-            raise
-
-    def _put(self, behaviour: str, value: float) -> None:
-        if behaviour in ("approach", "strike"):
-            setattr(self, behaviour, value)
-        else:
-            self.more[behaviour] = value
 
 
 @brief

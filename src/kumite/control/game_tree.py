@@ -8,7 +8,7 @@ styles, check points, wanted actions and depth may change between any two decisi
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +16,8 @@ import numpy as np
 from kumite.annotate import KINDS
 from kumite.body import lay_body
 from kumite.control.combination import build_table
-from kumite.control.styles import STYLES, VULNERABILITY, Style, short_range
+from kumite.control.rules import Player, Rules
+from kumite.control.styles import VULNERABILITY, short_range
 from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.kernels import game as fight
@@ -35,9 +36,6 @@ ARMS = ("left_forearm", "left_hand", "right_forearm", "right_hand")
 BULK = 0.08  # m by which a trunk is thicker for the other body: arms are held before it
 STOUTER = 1.1  # the spheres of a part are that much thicker than its capsule: they stand for all
 SLACK = 1e-6  # m by which bounds are wider than what they hold: no rounding makes a difference
-DEEPEST = 6  # levels; a seventh would take hours
-BOREDOM = 1e5  # score that an action loses for each recent use: a blow of 1 m/s
-RESTLESSNESS = 15.0  # score that an action loses for each recent one of its kind
 MEMORY = 8  # actions back that "recently" goes
 GOAL_EVERY = 0.25  # s
 CALM = ("transition", "idle")  # kinds of who waits
@@ -46,52 +44,6 @@ HALT_EVERY = 0.1  # s between places on a way to come to rest
 MOST_HALTS = 8  # such ways of a state
 OUTSIDE = 1e12  # score that an action loses which is not in the set: more than all else together
 COOPERATIVE = [HEADING, PLACE, REQUIREMENT]  # columns of weights
-
-
-FREE = ("catch", "arena")  # of the rules, which there need not be: 0
-
-
-@dataclass(frozen=True)
-class Rules:
-    """What is pruned (section V-C) and what counts as what."""
-
-    every: float = 0.1  # s between poses of which bodies are compared
-    facing: float = np.radians(60.0)  # rad from the opponent at the end of an action, at most
-    attack_range: float = 1.0  # m
-    defence_range: float = 3.0  # m
-    tip_radius: float = 0.03  # m, of a fist's front
-    catch: float = 0.0  # m between two that counts as caught; 0: nobody is
-    arena: float = 0.0  # m from the middle of the scene that nobody is to go beyond; 0: everywhere
-    stagger_from: float = 5.2  # m/s of a blow that staggers
-    fall_from: float = 10.0  # m/s of a blow that fells
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not np.isfinite(value) or value < 0 or (value == 0 and name not in FREE):
-                raise KumiteError(f"rules: {name} {value}; expected more than 0")
-
-
-@dataclass
-class Player:
-    """How one side plays. All of it may be changed while the scene runs."""
-
-    style: Style = field(default_factory=lambda: STYLES["boxer"])
-    depth: int = 3  # levels of the tree
-    wanted: tuple[str, ...] = ()  # A⁺, kinds or labels of actions
-    unwanted: tuple[str, ...] = ()  # A⁻
-    goal: np.ndarray | None = None  # [G, 2] m, where to be now and every GOAL_EVERY s
-    facing: float | None = None  # rad, in place of the rules' own
-    boredom: float = BOREDOM  # score that an action loses for each recent use (B11)
-    restlessness: float = RESTLESSNESS  # and for each recent one of its kind
-    only: tuple[str, ...] = ()  # the action set, kinds or labels; empty: all
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.depth <= DEEPEST:
-            raise KumiteError(f"depth {self.depth}; expected 1 to {DEEPEST}")
-        for name in ("boredom", "restlessness"):
-            value = getattr(self, name)
-            if not 0 <= value < np.inf:
-                raise KumiteError(f"{name} {value}; expected 0 or more, finite")
 
 
 @dataclass(frozen=True)

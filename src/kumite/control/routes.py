@@ -11,10 +11,16 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
-
-import numpy as np
+from math import isfinite
+from typing import TYPE_CHECKING
 
 from kumite.errors import KumiteError
+from kumite.lazy import Later
+
+if TYPE_CHECKING:
+    import numpy as np
+else:
+    np = Later("numpy")
 
 RADIUS = 0.5  # m
 NEVER = float("inf")  # s
@@ -39,9 +45,9 @@ class CheckPoint:
             put(self, name, (given,) if isinstance(given, str) else tuple(given))
         put(self, "place", tuple(float(v) for v in self.place))
         wrong = []
-        if len(self.place) != 2 or not np.isfinite(self.place).all():
+        if len(self.place) != 2 or not all(map(isfinite, self.place)):
             wrong.append(f"place {self.place}; expected x and z, finite")
-        if self.time is not None and not np.isfinite(self.time):
+        if self.time is not None and not isfinite(self.time):
             wrong.append(f"time {self.time}; expected seconds, or none")
         if not 0 < self.radius < NEVER:
             wrong.append(f"radius {self.radius}; expected metres above 0")
@@ -356,7 +362,7 @@ def spiral(
 
     Check points lie evenly along the way, so that times (see :func:`line`) ask for one speed.
     """
-    if not (inner >= 0 and outer >= 0 and np.isfinite([inner, outer, turns, angle]).all()):
+    if not (inner >= 0 and outer >= 0 and all(map(isfinite, (inner, outer, turns, angle)))):
         raise KumiteError(
             f"route: radii {inner:g} and {outer:g} m, {turns:g} turns from {angle:g} rad; expected "
             "finite numbers, and radii of 0 or more"
@@ -381,7 +387,7 @@ def _shares(points: int) -> np.ndarray:
 
 
 def _timed(places: np.ndarray, seconds: float | None, begin: float, radius: float) -> Route:
-    if seconds is not None and not (0 <= seconds < NEVER and np.isfinite(begin)):
+    if seconds is not None and not (0 <= seconds < NEVER and isfinite(begin)):
         raise KumiteError(
             f"route: {seconds} s from {begin} s on; expected finite numbers, 0 s or more"
         )

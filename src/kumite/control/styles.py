@@ -16,12 +16,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
+from math import isfinite
+from numbers import Real
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from kumite.annotate import DIRECTIONS, KINDS, Actions
+from kumite.annotate.vocabulary import DIRECTIONS, KINDS
 from kumite.errors import KumiteError, unknown
 from kumite.kernels import style as columns
+from kumite.lazy import Later
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from kumite.annotate import Actions
+else:
+    np = Later("numpy")
 
 UNIT_SPEED = 1.0  # v', m/s (the paper's 100, of centimetres a second)
 VULNERABILITY = {"head": 2.0, "torso": 1.0, "limbs": 0.0}  # w_being_attack
@@ -51,11 +60,11 @@ class Style:
         for name, value in asdict(self).items():
             if value is None and name == "preferred_heading":
                 continue
-            if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+            if isinstance(value, bool) or not isinstance(value, Real):
                 wrong.append(f"{name}: {value!r}; expected a number")
                 continue
             object.__setattr__(self, name, float(value))
-            if not np.isfinite(value):
+            if not isfinite(value):
                 wrong.append(f"{name}: {float(value)}; expected a finite number")
             elif value < 0 and name not in ANGLES:
                 wrong.append(f"{name}: {float(value):g}; expected 0 or more")

@@ -1,5 +1,5 @@
 """Motion capture files in: BVH, ASF/AMC, whole folders; units, axes and joint roles found."""
 
-from kumite.mocap.folder import BadFile, ClipInfo, Fact, Loaded, load
+from kumite.lazy import names_of
 
-__all__ = ["BadFile", "ClipInfo", "Fact", "Loaded", "load"]
+__getattr__, __dir__, __all__ = names_of(__name__, __file__)

@@ -9,55 +9,22 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
-from pydantic import Field, model_validator
 
 from kumite.body import Body, Spheres, limb_spheres, strikes_with
 from kumite.clip import LIMBS, forward_kinematics
-from kumite.control import Fighters, Skill, Temper, approach, stretch_tracks, strike, trained
+from kumite.control import Fighters, Skill, approach, stretch_tracks, strike, trained
 from kumite.control.attack import Attack, from_limbs
 from kumite.errors import KumiteError
 from kumite.graph import Library
 from kumite.kernels.blow import NO_BLOW
 from kumite.rotation import planar_apply, planar_inverse, rotate, wrap_angle
-from kumite.scene.fighters import Finite, Metres, Name, Settings
 from kumite.scene.recording import Recording
+from kumite.scene.settings_dodge import AttackerSettings
 from kumite.synthesis import Cast
 
-STYLES = ("boxing", "sword")
 FORESEEN = 600  # frames that may be known ahead at most
-
-
-class AttackerSettings(Settings):
-    """Somebody who attacks those who avoid."""
-
-    name: Name
-    position: tuple[Metres, Metres]  # m, x and z
-    yaw_deg: Finite = 0.0  # 0 faces +Z
-    # Of the built-in performer, "boxing" or "sword"; or a .kumite file.
-    library: Annotated[str, Field(min_length=1, max_length=4096)] = "boxing"
-    approach: Annotated[Finite, Field(ge=0)] = 1.0  # weights of the behaviours
-    strike: Annotated[Finite, Field(ge=0)] = 6.0
-    facing: Annotated[Finite, Field(ge=0)] = 3.5
-    few: Annotated[int, Field(ge=1, le=50)] = 3  # drawn from the best few actions
-    personal_space: Annotated[Finite, Field(ge=0, le=3)] = 0.7  # m kept to the other's body
-
-    @model_validator(mode="after")
-    def _some_weight(self) -> AttackerSettings:
-        if self.library not in STYLES and not self.library.endswith(".kumite"):
-            raise ValueError(
-                f"library {self.library!r}: expected {' or '.join(STYLES)}, or a .kumite file"
-            )
-        if self.approach + self.strike == 0:
-            raise ValueError("all weights are 0; expected approach or strike above 0")
-        return self
-
-    def temper(self) -> Temper:
-        return Temper(
-            self.approach, self.strike, self.facing, self.few, personal_space=self.personal_space
-        )
 
 
 @dataclass(frozen=True)

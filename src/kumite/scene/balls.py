@@ -2,52 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import numpy as np
-from pydantic import Field, model_validator
 
 from kumite.body import Body
-from kumite.control.attack import GRAVITY, Attack, thrown
+from kumite.control.attack import Attack, thrown
 from kumite.errors import KumiteError
 from kumite.kernels import ball as kernels
 from kumite.kernels.blow import NO_HIT
 from kumite.rotation import rotate
-from kumite.scene.fighters import Finite, Settings
+from kumite.scene.settings_dodge import BallsSettings
 from kumite.scene.stage import OUT_OF_SIGHT, SceneObject
 
-POOL = 12  # balls that are seen at once: the oldest is thrown again
 BOUNCE = 0.55  # share of its speed that a ball keeps when it bounces off the floor …
 OFF_A_BODY = 0.25  # … and off somebody
 ROLLING = 0.6  # 1/s, the rate at which a ball that lies comes to rest
 REST = 0.3  # m/s: slower downwards it bounces no more
-
-Range = tuple[Finite, Finite]
-
-
-class BallsSettings(Settings):
-    """Who throws: from how far, how fast, at what part of those who avoid."""
-
-    throws: Annotated[int, Field(ge=0, le=100_000)] = 0  # 0: only by hand
-    first: Annotated[Finite, Field(ge=0)] = 1.0  # s, of the first throw
-    every: Annotated[Finite, Field(ge=0.02, le=3600)] = 2.5  # s between throws
-    speed: Range = (8.0, 13.0)  # m/s, mean over the ground
-    distance: Range = (5.0, 8.0)  # m
-    height: Range = (1.0, 1.9)  # m above the ground that it leaves the hand
-    bearing_deg: Annotated[Finite, Field(ge=0, le=180)] = 70.0  # off straight ahead, at most
-    radius: Annotated[Finite, Field(ge=0.01, le=0.5)] = 0.11  # m
-    gravity: Annotated[Finite, Field(ge=0, le=100)] = GRAVITY  # m/s²
-    pool: Annotated[int, Field(ge=1, le=1000)] = POOL
-
-    @model_validator(mode="after")
-    def _ranges(self) -> BallsSettings:
-        for name, least in (("speed", 0.5), ("distance", 0.5), ("height", 0.0)):
-            low, high = getattr(self, name)
-            if not least <= low <= high <= 400:
-                raise ValueError(
-                    f"{name} = [{low:g}, {high:g}]; expected from {least:g} to 400, in order"
-                )
-        return self
 
 
 class Balls:

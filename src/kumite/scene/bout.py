@@ -39,13 +39,14 @@ from kumite.scene.controls import (
     style_controls,
 )
 from kumite.scene.doors import check_scene
-from kumite.scene.fighters import ARENA, NEAREST, BoutSettings
 from kumite.scene.floor import Floor, Landing
 from kumite.scene.reactions import MOST_PHYSICAL, Reactions
 from kumite.scene.recording import Event
 from kumite.scene.settings import SceneSettings
+from kumite.scene.settings_base import ARENA, NEAREST
+from kumite.scene.settings_fight import BoutSettings, CueSettings
 from kumite.scene.stage import SceneObject
-from kumite.scene.story import CueSettings, Story
+from kumite.scene.story import Story
 
 NEAR = 6.0  # m within which others are minded
 FREE = 1.5  # times the distance of a catch: so far one has got away

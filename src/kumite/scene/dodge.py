@@ -2,92 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
-
 import numpy as np
-from pydantic import Field
 
-from kumite.body import Spheres, lay_body, load_spheres
-from kumite.clip import Skeleton
+from kumite.body import lay_body
 from kumite.control.attack import thrown
-from kumite.control.avoidance import AvoidanceRules, AvoidanceSearch, Outcome
+from kumite.control.avoidance import AvoidanceSearch, Outcome
 from kumite.errors import KumiteError
 from kumite.graph import Library
-from kumite.scene.balls import Balls, BallsSettings, aimed, capsules_of, velocity_to
+from kumite.scene.balls import Balls, aimed, capsules_of, velocity_to
 from kumite.scene.controls import SearchControl, search_controls
-from kumite.scene.dodgers import Dodgers, background
+from kumite.scene.dodgers import Dodgers, background, volume_of
 from kumite.scene.doors import check_scene
-from kumite.scene.fighters import Finite, Metres, Name, Settings
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.recording import Event
+from kumite.scene.settings_dodge import BallsSettings, DodgeSettings
 from kumite.scene.stage import SceneObject
-from kumite.synthesis.cast import FASTEST
 
 AIM_SPREAD = 0.03  # m by which throws miss the middle of what they are aimed at
 TRUE = 0.10  # m from a body as it stands: a ball that passes no farther off was aimed well
 RECOIL = 0.01  # m that a struck segment gives way per m/s of the ball
-
-
-class DodgerSettings(Settings):
-    """Somebody who avoids."""
-
-    name: Name
-    position: tuple[Metres, Metres]  # m, x and z
-    yaw_deg: Finite = 0.0  # 0 faces +Z
-
-
-class DodgersSettings(Settings):
-    """Many of them, in rows."""
-
-    count: Annotated[int, Field(ge=1, le=10_000)] = 9
-    spacing: Annotated[Finite, Field(ge=1.0, le=50.0)] = 4.0  # m
-
-    def dodgers(self) -> tuple[DodgerSettings, ...]:
-        across = max(1, round(self.count**0.5))
-        rows = -(-self.count // across)
-        return tuple(
-            DodgerSettings(
-                name=f"dodger {n + 1}",
-                position=(
-                    self.spacing * (n % across - 0.5 * (across - 1)),
-                    -self.spacing * (n // across - 0.5 * (rows - 1)),
-                ),
-            )
-            for n in range(self.count)
-        )
-
-
-class DodgeSettings(Settings):
-    """How they search; names as in :class:`~kumite.control.avoidance.AvoidanceRules`."""
-
-    library: Literal["avoidance", "boxing"] = "avoidance"  # of the built-in performer
-    window: Annotated[Finite, Field(gt=0, le=10)] = 1.0  # s
-    avoidance: Annotated[Finite, Field(ge=0)] = 1.0  # weights
-    body: Annotated[Finite, Field(ge=0)] = 1.0
-    timescale: Annotated[Finite, Field(ge=0)] = 1.0
-    clearance: Annotated[Finite, Field(ge=0, le=1)] = 0.02  # m
-    most: Annotated[Finite, Field(ge=1, le=FASTEST)] = 4.0
-    latency: Annotated[int, Field(ge=1, le=120)] = 1  # frames until a search is taken up
-    spheres: str | None = None  # a file of the body's volume (kumite spheres); by default laid
-    index: bool = True
-    culling: bool = True
-    searches: bool = True  # False: they only stand about
-    counters: bool = True  # where a blow has been avoided, they strike back, if they have blows
-    distance: Annotated[Finite, Field(ge=0.5, le=10)] = 1.0  # m kept to whoever attacks
-
-    def body_volume(self, skeleton: Skeleton) -> Spheres | None:
-        """The body's volume, if a file says what it is. Errors: of the file."""
-        return None if self.spheres is None else load_spheres(self.spheres, skeleton)
-
-    def search(self) -> AvoidanceRules:
-        return AvoidanceRules(
-            window=self.window,
-            weights=(self.avoidance, self.body, self.timescale),
-            clearance=self.clearance,
-            most=self.most,
-            index=self.index,
-            culling=self.culling,
-        )
 
 
 class DodgeScene:
@@ -107,7 +40,7 @@ class DodgeScene:
         self.names = tuple(d.name for d in settings.dodging)
         self.dodge = settings.dodge or DodgeSettings()
         self.balls_settings = settings.balls or BallsSettings()
-        volume = self.dodge.body_volume(library.clips.skeleton)
+        volume = volume_of(self.dodge, library.clips.skeleton)
         self.search = AvoidanceSearch(library, self.dodge.search(), spheres=volume)
         _ = self.search.masks, self.search.index  # made now, not at the first throw
         self._streams: bool | None = None  # None: as many throws as the settings say

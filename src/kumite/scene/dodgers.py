@@ -14,9 +14,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from kumite.body import Spheres, load_spheres
+from kumite.clip import Skeleton
 from kumite.control.attack import Attack
 from kumite.control.avoidance import Avoidance, AvoidanceSearch, Outcome, Plan, Standing
 from kumite.rotation import planar_compose, wrap_angle
+from kumite.scene.settings_dodge import DodgeSettings
 from kumite.synthesis import Cast
 
 LATENCY = 1  # frames after which what a search has found is taken up
@@ -39,6 +42,11 @@ def background() -> ThreadPoolExecutor:
     if not _POOL:
         _POOL.append(ThreadPoolExecutor(1, "avoidance"))
     return _POOL[0]
+
+
+def volume_of(dodge: DodgeSettings, skeleton: Skeleton) -> Spheres | None:
+    """The body's volume, if a file says what it is. Errors: of the file."""
+    return None if dodge.spheres is None else load_spheres(dodge.spheres, skeleton)
 
 
 @dataclass

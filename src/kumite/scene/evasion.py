@@ -26,12 +26,12 @@ from kumite.rotation import planar_apply, wrap_angle
 from kumite.scene.apart import held_apart, push_two
 from kumite.scene.attackers import Attackers, Blow, middle_of, skill_of
 from kumite.scene.blows import Blows, Contact
-from kumite.scene.dodge import DodgeSettings
-from kumite.scene.dodgers import Dodgers
+from kumite.scene.dodgers import Dodgers, volume_of
 from kumite.scene.doors import check_scene
 from kumite.scene.live import RECOIL
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.recording import Event
+from kumite.scene.settings_dodge import DodgeSettings
 from kumite.scene.stage import SceneObject
 from kumite.synthesis import Cast
 
@@ -127,7 +127,7 @@ class EvasionScene:
             for name in side
         )
         self.dodge = settings.dodge or DodgeSettings()
-        volume = self.dodge.body_volume(library.clips.skeleton)
+        volume = volume_of(self.dodge, library.clips.skeleton)
         self.search = AvoidanceSearch(library, self.dodge.search(), spheres=volume)
         _ = self.search.masks, self.search.index  # made now, not at the first blow
         self.skill = skill_of(attack, cache, progress)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from kumite.scene.dodge import DodgeSettings
-from kumite.scene.errands import PrepareSettings
-from kumite.scene.fighters import BoutSettings
 from kumite.scene.settings import SceneSettings
+from kumite.scene.settings_dodge import DodgeSettings
+from kumite.scene.settings_fight import BoutSettings
+from kumite.scene.settings_prepare import PrepareSettings
 
 
 @dataclass(frozen=True)

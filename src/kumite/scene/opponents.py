@@ -6,7 +6,7 @@ import numpy as np
 
 from kumite.control.guide import seen
 from kumite.rotation import from_yaw, planar_apply, planar_inverse, rotate
-from kumite.scene.errands import OpponentsSettings
+from kumite.scene.settings_prepare import OpponentsSettings
 from kumite.scene.walkers import NOTHING, ON_THE_WAY, Walkers
 
 NOBODY = -1

@@ -19,11 +19,11 @@ from kumite.kernels.blow import swept_contact
 from kumite.rotation import rotate
 from kumite.scene.balls import capsules_of
 from kumite.scene.doors import check_scene
-from kumite.scene.errands import PrepareSettings
 from kumite.scene.floor import TARGET_PARTS
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.opponents import NOBODY, Opponents, closing_in
 from kumite.scene.recording import Event
+from kumite.scene.settings_prepare import PrepareSettings
 from kumite.scene.stage import SceneObject
 from kumite.scene.things import STRIKE, Things
 from kumite.scene.walkers import ARRIVED, NOTHING, ON_THE_WAY, Walkers

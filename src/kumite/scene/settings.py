@@ -12,29 +12,23 @@ from pydantic import Field, model_validator
 from kumite import toml
 from kumite.errors import KumiteError
 from kumite.scene import catalogue
-from kumite.scene.attackers import AttackerSettings
-from kumite.scene.balls import BallsSettings
-from kumite.scene.dodge import DodgerSettings, DodgersSettings, DodgeSettings
-from kumite.scene.errands import (
+from kumite.scene.settings_base import ARENA, FARTHEST, NEAREST, Finite, Metres, Name, Settings
+from kumite.scene.settings_dodge import (
+    AttackerSettings,
+    BallsSettings,
+    DodgerSettings,
+    DodgersSettings,
+    DodgeSettings,
+)
+from kumite.scene.settings_fight import BoutSettings, CueSettings, FighterSettings, VehicleSettings
+from kumite.scene.settings_pairs import MOST_PAIRS, PairsSettings
+from kumite.scene.settings_prepare import (
     OpponentsSettings,
     PrepareSettings,
     TargetSettings,
     WalkerSettings,
     WalkersSettings,
 )
-from kumite.scene.fighters import (
-    ARENA,
-    FARTHEST,
-    NEAREST,
-    BoutSettings,
-    FighterSettings,
-    Finite,
-    Metres,
-    Name,
-    Settings,
-)
-from kumite.scene.formation import MOST_PAIRS, PairsSettings
-from kumite.scene.story import CueSettings, VehicleSettings
 
 Weight = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 DOWN = 2.0  # s after which a ball that was thrown has come down

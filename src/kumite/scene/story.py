@@ -6,91 +6,17 @@ a car" at the end of the path; the hero "retreats into an alley where an ally jo
 
 from __future__ import annotations
 
-from typing import Annotated, Protocol
+from typing import Protocol
 
 import numpy as np
-from pydantic import Field, model_validator
 
-from kumite.control import Progress, Route
+from kumite.control import Progress
 from kumite.rotation import planar_apply, planar_inverse
-from kumite.scene.fighters import (
-    CheckPointSettings,
-    Depth,
-    Finite,
-    Manner,
-    Metres,
-    Name,
-    Positive,
-    Settings,
-    check_points,
-)
+from kumite.scene.settings_fight import CueSettings, Moment, VehicleSettings
 from kumite.scene.stage import SceneObject
 
 BRAKE = 8.0  # m/s² of a vehicle that has run somebody over
 CLEAR = 0.25  # m kept before a vehicle by the middle of whom it carries away
-
-
-CHANGES = ("against", "style", "depth", "wanted", "unwanted", "only", "point")  # by a cue
-
-
-class Moment(Settings):
-    """When: at a time, or when a fighter, or each of several, has come to a check point."""
-
-    at: Annotated[Finite, Field(ge=0)] | None = None  # s
-    after: Name | Annotated[tuple[Name, ...], Field(min_length=1)] | None = None
-    check_point: int = -1  # of that fighter's route; -1 is the last
-
-    @model_validator(mode="after")
-    def _one_of_both(self) -> Moment:
-        if (self.at is None) == (self.after is None):
-            raise ValueError('expected "at", a time, or "after", a fighter at a check point')
-        return self
-
-    @property
-    def waits_for(self) -> tuple[str, ...]:
-        """The fighters who have to come to that check point."""
-        after = self.after or ()
-        return (after,) if isinstance(after, str) else after
-
-
-class CueSettings(Moment):
-    """From a moment on somebody fights otherwise. What is not named stays."""
-
-    who: Name
-    against: Name | None = None
-    style: str | dict[str, str | float] | None = None
-    depth: Depth | None = None
-    wanted: tuple[str, ...] | None = None
-    unwanted: tuple[str, ...] | None = None
-    only: tuple[str, ...] | None = None
-    point: tuple[CheckPointSettings, ...] | None = None  # a new route
-
-    def route(self) -> Route | None:
-        return None if self.point is None else check_points(self.point)
-
-    @model_validator(mode="after")
-    def _changes_something(self) -> CueSettings:
-        if all(getattr(self, name) is None for name in CHANGES):
-            raise ValueError(f"it changes nothing; expected one of {', '.join(CHANGES)}")
-        if self.style is not None:
-            Manner(style=self.style)  # raises what is wrong with it
-        return self
-
-
-class VehicleSettings(Moment):
-    """A box that drives from a place to another from a moment on, and runs down whom it meets."""
-
-    name: Name
-    size: tuple[Positive, Positive, Positive] = (1.8, 1.5, 4.2)  # m: width, height, length
-    start: tuple[Metres, Metres]
-    end: tuple[Metres, Metres]
-    speed: Annotated[Finite, Field(gt=0, le=60)] = 10.0  # m/s
-
-    @model_validator(mode="after")
-    def _goes_somewhere(self) -> VehicleSettings:
-        if self.start == self.end:
-            raise ValueError("start and end are the same; expected a way")
-        return self
 
 
 class Actors(Protocol):

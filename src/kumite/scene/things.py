@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from kumite.body import Body
+from kumite.control.rules import GRAVITY
 from kumite.errors import KumiteError
 from kumite.graph.preparing import KINDS, Preparing
 from kumite.scene.balls import BOUNCE, REST, ROLLING
 from kumite.scene.doors import a_place
-from kumite.scene.errands import TargetSettings
+from kumite.scene.settings_prepare import TargetSettings
 from kumite.scene.stage import SceneObject
 
 STRIKE, UNDER, OVER = range(len(KINDS))
@@ -17,7 +18,6 @@ BAR = 0.06  # m, thickness of bars, hurdles and posts
 SPARE = {UNDER: 0.02, OVER: -0.02}  # m by which an obstacle is easier than the motion could do
 MASS_RATIO = 1.2  # speed of a ball over that of the foot that kicks it
 LIFT = 0.25  # of its speed over the ground that a kicked ball gets upwards, at least
-GRAVITY = 9.81  # m/s²
 FRICTION = 0.9  # 1/s, of a ball that rolls in grass
 AT_REST = 0.15  # m/s: a ball that is slower lies
 SAMPLES = np.linspace(0.0, 1.0, 5)  # of a capsule, where it is tried against an obstacle

@@ -18,6 +18,7 @@ from kumite.kernels.blow import NO_BLOW
 from kumite.kernels.phase import AT_FRAME, move_all
 from kumite.rotation import planar_compose, planar_inverse, wrap_angle
 from kumite.synthesis.moment import Moment
+from kumite.synthesis.rates import FASTEST, SLOWEST
 from kumite.synthesis.recoil import RATE, REACTION_HALF_LIFE, give_way
 
 # Of a difference at rest a critically damped spring leaves 60 % after one of its half-lives, 24 %
@@ -26,7 +27,6 @@ JOIN_HALF_LIFE = 0.10  # s, for the difference of the joints at a join
 ROOT_HALF_LIFE = 0.20  # s, the same for the root: its speed must not be felt to jump
 LONGEST_FOOT_OFFSET = 0.30  # m that a planted foot may stand away from where the capture has it
 SPRINGS = kernels.Springs(JOIN_HALF_LIFE, ROOT_HALF_LIFE, REACTION_HALF_LIFE, LONGEST_FOOT_OFFSET)
-SLOWEST, FASTEST = 0.25, 4.0  # library frames per shown frame
 BLOW_BEFORE, BLOW_AFTER = 0.07, 0.12  # s around the effective frames in which a blow may land
 
 

@@ -3,20 +3,18 @@ VIII-C, figures 10 and 11)."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-import numpy as np
 from pydantic import Field
 
-from kumite.scene.fighters import (
-    CheckPointSettings,
-    FighterSettings,
-    Finite,
-    Manner,
-    Name,
-    Positive,
-    Settings,
-)
+from kumite.lazy import Later
+from kumite.scene.settings_base import Finite, Name, Positive, Settings
+from kumite.scene.settings_fight import CheckPointSettings, FighterSettings, Manner
+
+if TYPE_CHECKING:
+    import numpy as np
+else:
+    np = Later("numpy")
 
 MOST_PAIRS = 1000
 APART = 1.2  # m between the two of a pair when they begin

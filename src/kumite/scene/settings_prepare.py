@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from kumite.scene.fighters import Finite, Metres, Name, Settings
+from kumite.scene.settings_base import Finite, Metres, Name, Settings
 
 Curve = dict[str, Annotated[Finite, Field(gt=0)]]  # C by joint, role or group
 WIDEST = 20.0  # m

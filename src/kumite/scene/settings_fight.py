@@ -1,33 +1,22 @@
-"""Scene files of game-tree fights: who fights whom, in which style, along which check points."""
+"""Scene files of game-tree fights: who fights whom, in which style, along which check points, and
+what happens at a moment: somebody changes opponent or style, a car drives through.
+"""
 
 from __future__ import annotations
 
 from math import radians
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from kumite.control import CheckPoint, Route, Style, style
-from kumite.control.game_tree import BOREDOM, DEEPEST, RESTLESSNESS, Player, Rules
-from kumite.control.routes import line, spiral
+from kumite.control.routes import CheckPoint, Route, line, spiral
+from kumite.control.rules import BOREDOM, DEEPEST, RESTLESSNESS, Player, Rules
+from kumite.control.styles import Style, style
 from kumite.errors import KumiteError
+from kumite.scene.settings_base import FARTHEST, Finite, Metres, Name, Positive, Settings
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-FARTHEST = 1000.0  # m: recordings keep single precision
-Metres = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
-Name = Annotated[str, Field(min_length=1, max_length=60)]
 Depth = Annotated[int, Field(ge=1, le=DEEPEST)]
-
-
-NEAREST = "nearest"  # of those who are after one, or of all
-ARENA = "arena"  # what its edge is called among the objects
-
-
-class Settings(BaseModel):
-    """What a file may say: no other keys, and nothing changes later."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
+CHANGES = ("against", "style", "depth", "wanted", "unwanted", "only", "point")  # by a cue
 
 
 class CheckPointSettings(Settings):
@@ -160,3 +149,63 @@ class BoutSettings(Settings):
         apart = {"library", "facing_deg", "scatter", "scatter_deg", "reactions"}
         told = self.model_dump(exclude=apart, exclude_none=True)
         return Rules(facing=radians(self.facing_deg), **told)
+
+
+class Moment(Settings):
+    """When: at a time, or when a fighter, or each of several, has come to a check point."""
+
+    at: Annotated[Finite, Field(ge=0)] | None = None  # s
+    after: Name | Annotated[tuple[Name, ...], Field(min_length=1)] | None = None
+    check_point: int = -1  # of that fighter's route; -1 is the last
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Moment:
+        if (self.at is None) == (self.after is None):
+            raise ValueError('expected "at", a time, or "after", a fighter at a check point')
+        return self
+
+    @property
+    def waits_for(self) -> tuple[str, ...]:
+        """The fighters who have to come to that check point."""
+        after = self.after or ()
+        return (after,) if isinstance(after, str) else after
+
+
+class CueSettings(Moment):
+    """From a moment on somebody fights otherwise. What is not named stays."""
+
+    who: Name
+    against: Name | None = None
+    style: str | dict[str, str | float] | None = None
+    depth: Depth | None = None
+    wanted: tuple[str, ...] | None = None
+    unwanted: tuple[str, ...] | None = None
+    only: tuple[str, ...] | None = None
+    point: tuple[CheckPointSettings, ...] | None = None  # a new route
+
+    def route(self) -> Route | None:
+        return None if self.point is None else check_points(self.point)
+
+    @model_validator(mode="after")
+    def _changes_something(self) -> CueSettings:
+        if all(getattr(self, name) is None for name in CHANGES):
+            raise ValueError(f"it changes nothing; expected one of {', '.join(CHANGES)}")
+        if self.style is not None:
+            Manner(style=self.style)  # raises what is wrong with it
+        return self
+
+
+class VehicleSettings(Moment):
+    """A box that drives from a place to another from a moment on, and runs down whom it meets."""
+
+    name: Name
+    size: tuple[Positive, Positive, Positive] = (1.8, 1.5, 4.2)  # m: width, height, length
+    start: tuple[Metres, Metres]
+    end: tuple[Metres, Metres]
+    speed: Annotated[Finite, Field(gt=0, le=60)] = 10.0  # m/s
+
+    @model_validator(mode="after")
+    def _goes_somewhere(self) -> VehicleSettings:
+        if self.start == self.end:
+            raise ValueError("start and end are the same; expected a way")
+        return self

@@ -1,0 +1,3 @@
+"""How fast clips may be played."""
+
+SLOWEST, FASTEST = 0.25, 4.0  # library frames per shown frame
