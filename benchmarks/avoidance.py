@@ -26,7 +26,7 @@ from kumite.bench_avoidance import sixteen
 from kumite.control import cache_folder
 from kumite.control.attack import Attack, thrown
 from kumite.control.avoidance import Avoidance, AvoidanceSearch, Outcome, Standing
-from kumite.graph import Library, build_avoidance_library, builtin_library
+from kumite.graph import Layer, build_avoidance, builtin_layer
 from kumite.kernels import avoid as kernels
 from kumite.rotation import planar_apply
 from kumite.scene import load_scene
@@ -52,17 +52,17 @@ MOVES_ROOT = 0.3  # m: a part that carries the root farther is a step or a leap
 # Graphs ------------------------------------------------------------------------------------------
 
 
-def real() -> Library:
+def real() -> Layer:
     folder = Path(os.environ["KUMITE_MOCAP"]) / "woody"
-    return build_avoidance_library(mocap.load([folder / f"{name}.amc" for name in REAL]).clip_set())
+    return build_avoidance(mocap.load([folder / f"{name}.amc" for name in REAL]).clip_set())
 
 
 @cache
-def library(name: str) -> Library:
+def library(name: str) -> Layer:
     if name == "sixteen":
         return sixteen()
     if name == "performer":
-        return builtin_library(cache_folder(None), style="avoidance", level="avoidance")
+        return builtin_layer(cache_folder(None), style="avoidance", level="avoidance")
     return real()
 
 

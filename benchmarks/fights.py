@@ -18,7 +18,7 @@ from scipy.spatial import KDTree
 from kumite import mocap
 from kumite.control import Route, cache_folder
 from kumite.control.styles import VULNERABILITY, short_range
-from kumite.graph import Library, build_action_library, builtin_library
+from kumite.graph import Layer, build_actions, builtin_layer
 from kumite.scene import BoutScene, SceneSettings, load_scene, with_count
 
 FIRST_SEED = 200  # no settings were chosen with this one or those after it in view
@@ -80,14 +80,14 @@ class Fight:
 
 
 @cache
-def library(name: str) -> Library:
+def library(name: str) -> Layer:
     if name.endswith(ALL_WAYS):
         found = library(name.removesuffix(ALL_WAYS))
-        return build_action_library(found.clips, found.actions, most_ways=10**6)
+        return build_actions(found.clips, found.actions, most_ways=10**6)
     if name == REAL:
         folder = Path(os.environ["KUMITE_MOCAP"]) / "boxer"
-        return build_action_library(mocap.load(folder).clip_set())
-    return builtin_library(cache_folder(None), style=name, level="actions")
+        return build_actions(mocap.load(folder).clip_set())
+    return builtin_layer(cache_folder(None), style=name, level="actions")
 
 
 def boxers() -> list[str]:

@@ -15,7 +15,7 @@ from numba.core import event
 
 from kumite import caches
 from kumite.cli.scenes import _live_scene
-from kumite.graph import builtin_library
+from kumite.graph import builtin_layer
 from kumite.kernels.character import MANY
 from kumite.kernels.known import TABLE, called, forget, known
 from kumite.kernels.within import Kernel
@@ -62,7 +62,7 @@ def main() -> None:
         ("avoidance", "avoidance"),
         ("preparation", "targets"),
     ):
-        builtin_library(None, style=style, level=level)
+        builtin_layer(None, style=style, level=level)
         note(level)
         print(level, style, flush=True)
     scenes = builtin_scenes()

@@ -23,7 +23,7 @@ from reproduction import _put, _table
 
 from kumite.clip import LIMBS, SIDES
 from kumite.control import PreparationSettings, cache_folder
-from kumite.graph import Library, builtin_library, load_library
+from kumite.graph import Layer, builtin_layer, load_library
 from kumite.graph.preparing import KINDS
 from kumite.rotation import angle, conjugate, log, multiply, rotate
 from kumite.scene import PrepareScene
@@ -79,7 +79,7 @@ class Approaches:
         return frame < np.where(self.began, self.launch, len(self.alpha))
 
 
-def fields(library: Library, preparation: str, runs: int, seed: int) -> SceneSettings:
+def fields(library: Layer, preparation: str, runs: int, seed: int) -> SceneSettings:
     """A scene of ``runs`` approaches of each target motion."""
     preparing = library.preparing
     assert preparing is not None
@@ -113,7 +113,7 @@ def fields(library: Library, preparation: str, runs: int, seed: int) -> SceneSet
     )
 
 
-def approach(library: Library, cache_at: Path | None, way: str, runs: int, seed: int) -> Approaches:
+def approach(library: Layer, cache_at: Path | None, way: str, runs: int, seed: int) -> Approaches:
     """All approaches of a seed, in one way of preparing."""
     settings = fields(library, "ours" if way == PRINTED else way, runs, seed)
     learning = PreparationSettings() if way == PRINTED else None
@@ -196,11 +196,11 @@ def approach(library: Library, cache_at: Path | None, way: str, runs: int, seed:
 # Sections ----------------------------------------------------------------------------------------
 
 Played = Callable[[str], Approaches]
-_SECTIONS: dict[str, Callable[[Library, Played], str]] = {}
+_SECTIONS: dict[str, Callable[[Layer, Played], str]] = {}
 
 
 def _section(name: str):
-    def register(function: Callable[[Library, Played], str]):
+    def register(function: Callable[[Layer, Played], str]):
         _SECTIONS[name] = function
         return function
 
@@ -216,7 +216,7 @@ def _mean(values: np.ndarray, form: str) -> str:
 
 
 @_section("switch")
-def switch(library: Library, played: Played) -> str:
+def switch(library: Layer, played: Played) -> str:
     """How alike the poses are where target motions begin, and what jumps there."""
     rows = []
     for way in (*WAYS, PRINTED):
@@ -244,7 +244,7 @@ def switch(library: Library, played: Played) -> str:
 
 
 @_section("targets")
-def targets(library: Library, played: Played) -> str:
+def targets(library: Layer, played: Played) -> str:
     """What comes of each target motion."""
     preparing = library.preparing
     assert preparing is not None
@@ -281,7 +281,7 @@ def targets(library: Library, played: Played) -> str:
 
 
 @_section("approach")
-def way_there(library: Library, played: Played) -> str:
+def way_there(library: Layer, played: Played) -> str:
     """Speed and level on the way by distance."""
     rows = []
     for low, high in zip(BINS[:-1], BINS[1:]):
@@ -301,7 +301,7 @@ def way_there(library: Library, played: Played) -> str:
 
 
 @_section("smoothness")
-def smoothness(library: Library, played: Played) -> str:
+def smoothness(library: Layer, played: Played) -> str:
     """Levels as chosen and as shown, and how feet slide."""
     rows, source = [], source_skate(library)
     for way in (*WAYS, PRINTED):
@@ -341,9 +341,9 @@ def main() -> None:
         parser.error(f"--runs {given.runs}: expected at least 1")
     folder = cache_folder(given.library)
     if given.library is not None:
-        library = load_library(given.library)
+        library = load_library(given.library).layer("preparation")
     else:
-        library = builtin_library(folder, style="targets", level="preparation")
+        library = builtin_layer(folder, style="targets", level="preparation")
 
     @cache
     def played(way: str) -> Approaches:

@@ -14,7 +14,7 @@ import time
 import numpy as np
 from numba import get_num_threads, njit, prange
 
-from kumite.graph import builtin_library, load_library, pose_features
+from kumite.graph import builtin_layer, load_library, pose_features
 from kumite.kernels.distance import row_sums
 from kumite.synthesis import Cast
 
@@ -44,7 +44,9 @@ def best(work, repeats: int = 3) -> float:
 
 
 def main() -> None:
-    library = load_library(sys.argv[1]) if len(sys.argv) > 1 else builtin_library(None)
+    library = (
+        load_library(sys.argv[1]).layer("frames") if len(sys.argv) > 1 else builtin_layer(None)
+    )
     threads = get_num_threads()
     out = np.empty(threads, np.float32)
     rounds = 2_000_000

@@ -1,9 +1,9 @@
 """Two boxers of the built-in performer spar for ten seconds; the fight leaves as GLB."""
 
-from kumite import LiveScene, builtin_library, load_scene, measure, record
+from kumite import LiveScene, builtin_layer, load_scene, measure, record
 from kumite.export.gltf import write_glb
 
-library = builtin_library(None)
+library = builtin_layer(None)
 print(f"{library.table.states} states, {library.table.actions} actions")
 
 scene = LiveScene(load_scene("sparring"), library, seed=7)

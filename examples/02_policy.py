@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from kumite import approach, builtin_library, solve, strike
+from kumite import approach, builtin_layer, solve, strike
 
-library = builtin_library(None)
+library = builtin_layer(None)
 for behaviour in (approach(), strike(library)):
     policy = solve(library, behaviour)
     grid = behaviour.grid

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from kumite import LiveScene, builtin_library, load_scene, record, save_recording
+from kumite import LiveScene, builtin_layer, load_scene, record, save_recording
 
 Path("ring.toml").write_text(
     """
@@ -27,7 +27,7 @@ aims_at = "ann"
 strike = 5.0
 """
 )
-scene = LiveScene(load_scene("ring.toml"), builtin_library(None), seed=2)
+scene = LiveScene(load_scene("ring.toml"), builtin_layer(None), seed=2)
 fight = record(scene, seconds=20)
 for event in fight.events:
     if event.kind == "hit":

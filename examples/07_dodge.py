@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from kumite import AvoidanceSearch, DodgeScene, builtin_library, load_scene
+from kumite import AvoidanceSearch, DodgeScene, builtin_layer, load_scene
 from kumite.control import Standing, thrown
 
-library = builtin_library(None, style="avoidance", level="avoidance")
+library = builtin_layer(None, style="avoidance", level="avoidance")
 
 # One search by hand: somebody at rest, a ball on its way to the chest.
 search = AvoidanceSearch(library)

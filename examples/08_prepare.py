@@ -1,9 +1,9 @@
 """Somebody who prepares for a kick on the way to the ball, and who does not: what differs."""
 
-from kumite import PrepareScene, builtin_library, load_scene
+from kumite import PrepareScene, builtin_layer, load_scene
 from kumite.scene.settings_prepare import PrepareSettings
 
-library = builtin_library(None, style="targets", level="preparation")
+library = builtin_layer(None, style="targets", level="preparation")
 for preparation in ("none", "ours"):
     settings = load_scene("ball-kick").model_copy(
         update={"prepare": PrepareSettings(preparation=preparation)}

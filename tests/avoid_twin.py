@@ -15,7 +15,7 @@ from kumite.body import Spheres
 from kumite.clip import SIDES
 from kumite.control.attack import NEAR, Attack
 from kumite.control.avoidance import END_EFFECTORS, AvoidanceRules, Standing
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.synthesis.cast import JOIN_HALF_LIFE, LONGEST_FOOT_OFFSET, ROOT_HALF_LIFE
 
 VALID, HIT, STIFF, TOO_FAST = "valid", "hit", "stiff", "too fast"
@@ -23,7 +23,7 @@ VALID, HIT, STIFF, TOO_FAST = "valid", "hit", "stiff", "too fast"
 
 @dataclass(frozen=True)
 class Edge:
-    """Library frames that are played, from the one before the first, and where they are."""
+    """Layer frames that are played, from the one before the first, and where they are."""
 
     enter: float  # phase at which it begins
     stop: int
@@ -60,7 +60,7 @@ def anchored(here: np.ndarray, facing: np.ndarray) -> np.ndarray:
 
 
 class Twin:
-    def __init__(self, library: Library, spheres: Spheres, rules: AvoidanceRules) -> None:
+    def __init__(self, library: Layer, spheres: Spheres, rules: AvoidanceRules) -> None:
         self.library, self.rules = library, rules
         clips = library.clips
         position, world = clips.world
@@ -416,7 +416,7 @@ class Twin:
 
 
 def _set(anchor: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Library points [..., 3] in the scene."""
+    """Layer points [..., 3] in the scene."""
     out = np.array(points, dtype=float)
     out[..., [0, 2]] = anchor[:2] + out[..., [0, 2]] @ turned(anchor[2]).T
     return out

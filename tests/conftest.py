@@ -10,7 +10,7 @@ import pytest
 
 from kumite import caches, cli
 from kumite import mocap as mocap_files
-from kumite.graph import Library, build_library
+from kumite.graph import Layer, build_frames
 from tests.shared import builtin
 
 # Tests that make libraries and policies anew, in a cache folder of their own, share compiled code.
@@ -29,25 +29,25 @@ def mocap() -> Path:
 
 
 @pytest.fixture(scope="session")
-def library() -> Library:
+def library() -> Layer:
     """The built-in performer's library."""
     return builtin()
 
 
 @pytest.fixture(scope="session")
-def whole() -> Library:
+def whole() -> Layer:
     """The built-in performer's library of whole actions."""
     return builtin(level="actions")
 
 
 @pytest.fixture(scope="session")
-def boxer(mocap: Path) -> Library:
+def boxer(mocap: Path) -> Layer:
     """The real boxer's library."""
-    return build_library(mocap_files.load(mocap / "boxer").clip_set())
+    return build_frames(mocap_files.load(mocap / "boxer").clip_set())
 
 
 @pytest.fixture(scope="session")
-def fighters() -> Library:
+def fighters() -> Layer:
     """The built-in performer's library of whole actions, as it boxes."""
     return builtin("boxing", "actions")
 

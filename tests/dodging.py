@@ -9,7 +9,7 @@ import numpy as np
 from kumite.clip import concatenate
 from kumite.control.attack import Attack, thrown
 from kumite.control.avoidance import AvoidanceSearch, Standing, _now
-from kumite.graph import Library, build_avoidance_library
+from kumite.graph import Layer, build_avoidance
 from kumite.kernels import avoid as kernels
 from kumite.kernels import joins
 from kumite.performer.avoidance import AVOIDANCE
@@ -21,21 +21,21 @@ FPS = 30.0
 FEW = ("wait", "duck", "shuffle", "lean_left", "wait", "sidestep_right", "twist_right", "hollow")
 
 
-def performed(labels: tuple[str, ...], seed: int = 7, fps: float = FPS) -> Library:
+def performed(labels: tuple[str, ...], seed: int = 7, fps: float = FPS) -> Layer:
     """The performer's moves of the style avoidance, one after the other, as a library."""
     rng = np.random.default_rng(seed)
     moves: list[Move] = [AVOIDANCE.find(label) for label in labels]
     score = [vary(move, AVOIDANCE, rng) for move in moves]
     clip, _ = perform_take("few", score, AVOIDANCE, rng=rng)
-    return build_avoidance_library(concatenate([clip], fps))
+    return build_avoidance(concatenate([clip], fps))
 
 
 @cache
-def few() -> Library:
+def few() -> Layer:
     return performed(FEW + FEW[:3])
 
 
-def somewhere(rng: np.random.Generator, library: Library) -> Standing:
+def somewhere(rng: np.random.Generator, library: Layer) -> Standing:
     """Anywhere in a stretch, played at any speed, after a join or not."""
     table = library.table
     stretch = int(rng.integers(len(table.first)))

@@ -13,7 +13,7 @@ from kumite.control import PreparationSettings, approach_motions, gradual, train
 from kumite.control import preparation as learning
 from kumite.control.preparation import build_process
 from kumite.errors import KumiteError
-from kumite.graph import Library, save_library
+from kumite.graph import Layer, save_library
 from kumite.graph.preparing import Preparing
 from kumite.rotation import planar_compose, planar_inverse
 from tests.shared import builtin
@@ -21,17 +21,17 @@ from tests.shared import builtin
 QUICK = gradual(places=16, batch=1)
 
 
-def prepared(library: Library) -> Preparing:
+def prepared(library: Layer) -> Preparing:
     assert library.preparing is not None
     return library.preparing
 
 
 @pytest.fixture(scope="module")
-def library() -> Library:
+def library() -> Layer:
     return builtin("targets", "preparation")
 
 
-def test_every_core_that_moves_is_steered(library: Library):
+def test_every_core_that_moves_is_steered(library: Layer):
     approach = approach_motions(library, steer=(0.0, 0.5, -0.5), gaits=("run", "walk"))
     cores = prepared(library).hierarchy.cores
     stand, walk = cores.label.index("stand"), cores.label.index("walk")
@@ -47,7 +47,7 @@ def test_every_core_that_moves_is_steered(library: Library):
             assert approach.motions.follows[r, c] == links[a, b]
 
 
-def test_gaits_say_which_cores_are_taken(library: Library):
+def test_gaits_say_which_cores_are_taken(library: Layer):
     cores = prepared(library).hierarchy.cores
     for gaits in (["walk"], ["run"], ["run", "walk"]):
         approach = approach_motions(library, gaits=gaits)
@@ -60,7 +60,7 @@ def test_gaits_say_which_cores_are_taken(library: Library):
     assert fast > 1.5 * slow  # m/s
 
 
-def test_a_steered_walk_is_the_walk_turned_frame_by_frame(library: Library):
+def test_a_steered_walk_is_the_walk_turned_frame_by_frame(library: Layer):
     approach = approach_motions(library, steer=(0.0, 0.6))
     cores, clips = prepared(library).hierarchy.cores, library.clips
     walk = cores.label.index("walk")
@@ -81,13 +81,13 @@ def test_a_steered_walk_is_the_walk_turned_frame_by_frame(library: Library):
     assert moved[steered, 0, 2] - moved[plain, 0, 2] == pytest.approx(0.6, abs=1e-6)
 
 
-def test_without_steering_goals_behind_are_out_of_reach(library: Library):
+def test_without_steering_goals_behind_are_out_of_reach(library: Layer):
     with pytest.raises(KumiteError, match="the goal cannot be reached from 16 of 32 cells"):
         build_process(approach_motions(library, steer=(0.0,)).motions, gradual())
     build_process(approach_motions(library).motions, gradual())
 
 
-def test_motions_that_cannot_be(library: Library, fighters: Library):
+def test_motions_that_cannot_be(library: Layer, fighters: Layer):
     with pytest.raises(KumiteError, match=r"unknown gait 'stand'.*run, walk"):
         approach_motions(library, gaits=("stand",))
     with pytest.raises(KumiteError, match="holds no target motions; expected one for preparation"):
@@ -99,7 +99,7 @@ def test_motions_that_cannot_be(library: Library, fighters: Library):
         approach_motions(library, steer=(0.0, 0.3, 0.3))
 
 
-def test_what_is_learned_is_kept_and_taken_up_again(library: Library, tmp_path: Path):
+def test_what_is_learned_is_kept_and_taken_up_again(library: Layer, tmp_path: Path):
     approach, whole = trained_approach(library, tmp_path / "a", QUICK, seed=3, most_batches=6)
 
     def stop(batch: int, changed: float) -> None:

@@ -14,7 +14,7 @@ from kumite.control.game_tree import Rules
 from kumite.errors import KumiteError
 from kumite.export.gltf import write_glb
 from kumite.export.sheet import recording_sheet
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.scene import BoutScene, Playback, SceneSettings, load_scene, record
 from tests.shared import builtin
 
@@ -22,12 +22,12 @@ SLACK = 0.1  # m: bodies sway and joins blend about where the actions lead
 
 
 @pytest.fixture(scope="module")
-def boxing() -> Library:
+def boxing() -> Layer:
     return builtin(level="actions")
 
 
 @pytest.fixture(scope="module")
-def running() -> Library:
+def running() -> Layer:
     return builtin("locomotion", "actions")
 
 
@@ -47,7 +47,7 @@ def _off(scene: BoutScene, seconds: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-def test_a_chase_stays_inside_and_nobody_had_to_break_the_rule(running: Library, seed: int):
+def test_a_chase_stays_inside_and_nobody_had_to_break_the_rule(running: Layer, seed: int):
     scene = BoutScene(load_scene("chase"), running, seed=seed)
     scene.players[0].depth = 2
     arena = scene.tree.rules.arena
@@ -58,7 +58,7 @@ def test_a_chase_stays_inside_and_nobody_had_to_break_the_rule(running: Library,
     assert not [f for d in scene.decisions for f in d.flaws if "arena" in f]
 
 
-def test_boxers_stay_in_a_ring_however_hard_they_are_hit(boxing: Library):
+def test_boxers_stay_in_a_ring_however_hard_they_are_hit(boxing: Layer):
     scene = BoutScene(_settings("boxing", arena=1.0, fall_from=7.0), boxing, seed=3)
     off = _off(scene, 30.0)
     assert any(e.kind == "reaction" for e in scene.events)
@@ -68,7 +68,7 @@ def test_boxers_stay_in_a_ring_however_hard_they_are_hit(boxing: Library):
 
 
 @pytest.mark.parametrize("way", [(0.0, 6.0), (-5.0, -3.0)])
-def test_who_is_carried_outside_comes_back(running: Library, way: tuple[float, float]):
+def test_who_is_carried_outside_comes_back(running: Layer, way: tuple[float, float]):
     scene = BoutScene(_settings("chase", scatter=0.0), running, seed=0)
     scene.players[0].depth = 2
     _off(scene, 1.0)
@@ -82,7 +82,7 @@ def test_who_is_carried_outside_comes_back(running: Library, way: tuple[float, f
     assert off.max() < off[0] + 2.0  # no farther than what it did then
 
 
-def test_an_arena_out_of_reach_makes_no_difference(boxing: Library):
+def test_an_arena_out_of_reach_makes_no_difference(boxing: Layer):
     free = BoutScene(_settings("boxing"), boxing, seed=2)
     wide = BoutScene(_settings("boxing", arena=900.0), boxing, seed=2)
     for _ in range(300):
@@ -92,7 +92,7 @@ def test_an_arena_out_of_reach_makes_no_difference(boxing: Library):
     assert free.objects == [] and len(wide.objects) == 1
 
 
-def test_any_number_of_threads_gives_the_same_chase(running: Library):
+def test_any_number_of_threads_gives_the_same_chase(running: Layer):
     def chased(threads: int) -> tuple[bytes, list]:
         numba.set_num_threads(threads)
         scene = BoutScene(load_scene("chase"), running, seed=5)
@@ -106,7 +106,7 @@ def test_any_number_of_threads_gives_the_same_chase(running: Library):
         numba.set_num_threads(most)
 
 
-def test_its_edge_is_a_line_wherever_objects_are_shown(boxing: Library, tmp_path: Path):
+def test_its_edge_is_a_line_wherever_objects_are_shown(boxing: Layer, tmp_path: Path):
     recording = record(BoutScene(_settings("boxing", arena=3.0), boxing), 0.5)
     (edge,) = Playback(recording).objects
     assert (edge.name, edge.line, edge.radius, edge.draggable) == ("arena", True, 3.0, False)

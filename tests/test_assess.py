@@ -15,19 +15,19 @@ from kumite.errors import KumiteError
 from kumite.graph import (
     JoinBound,
     JoinMeter,
-    Library,
+    Layer,
     assess,
-    build_action_library,
-    build_avoidance_library,
-    build_library,
-    builtin_library,
+    build_actions,
+    build_avoidance,
+    build_frames,
+    builtin_layer,
 )
 from kumite.graph.assess import SOON, ways_out_soon
 from kumite.rotation import angle, from_axis_angle, multiply
 from tests import toys
 
 
-def joins_of(library: Library) -> tuple[np.ndarray, np.ndarray]:
+def joins_of(library: Layer) -> tuple[np.ndarray, np.ndarray]:
     """Source and target [X] of all joins of a table."""
     table = library.table
     source = table.state_frame[np.repeat(np.arange(table.states), np.diff(table.action_start))]
@@ -60,12 +60,12 @@ TIGHT = JoinBound(0.03, 0.4, 0.8)
 @pytest.mark.parametrize(
     "build, bound",
     [
-        (build_library, JoinBound(0.01, 0.09, 0.15)),
-        (build_action_library, TIGHT),
-        (build_avoidance_library, TIGHT),
+        (build_frames, JoinBound(0.01, 0.09, 0.15)),
+        (build_actions, TIGHT),
+        (build_avoidance, TIGHT),
     ],
 )
-def test_no_join_jumps_farther_than_the_bound(library: Library, build, bound: JoinBound):
+def test_no_join_jumps_farther_than_the_bound(library: Layer, build, bound: JoinBound):
     """Measured by forward kinematics, apart from what measures it in the build."""
     clips = concatenate(list(library.clips)[:10])
     free = build(clips, bound=JoinBound(9.0, 9.0, 99.0))
@@ -86,25 +86,25 @@ def test_no_join_jumps_farther_than_the_bound(library: Library, build, bound: Jo
     assert ways.min() >= 1 and np.isin(made.table.target, np.arange(made.table.states)).all()
 
 
-def test_a_bound_that_nothing_keeps_to_names_its_options(library: Library):
+def test_a_bound_that_nothing_keeps_to_names_its_options(library: Layer):
     clips = concatenate(list(library.clips)[:3])
     with pytest.raises(KumiteError, match=r"--join-height.*--join-angle.*--join-speed"):
-        build_library(clips, bound=JoinBound(1e-9, 1e-9, 1e-9))
+        build_frames(clips, bound=JoinBound(1e-9, 1e-9, 1e-9))
     for wrong in (0.0, -1.0, float("nan")):
         with pytest.raises(KumiteError, match="expected more than 0"):
             JoinBound(angle=wrong)
 
 
-def test_a_good_library_loses_no_join(library: Library, whole: Library):
+def test_a_good_library_loses_no_join(library: Layer, whole: Layer):
     for one in (library, whole):
         assert one.report["joins_over_bound"] == 0
 
 
-def test_verdicts_follow_what_is_there(library: Library, whole: Library):
+def test_verdicts_follow_what_is_there(library: Layer, whole: Layer):
     found = assess(library)
     assert found.verdict("fight by policy").word == "will work"
-    assert "--level actions" in found.verdict("fight by tree").advice
-    assert "--level preparation" in found.verdict("prepare").advice
+    assert "--layer actions" in found.verdict("fight by tree").advice
+    assert "--layer preparation" in found.verdict("prepare").advice
     assert assess(whole).verdict("fight by tree").word == "will work"
     own, joins = JoinMeter(library.clips).own(), joins_of(library)
     jumps = JoinMeter(library.clips).joins(*joins)
@@ -121,33 +121,35 @@ def test_verdicts_follow_what_is_there(library: Library, whole: Library):
 
 def test_build_ends_with_what_the_library_is_worth(run, tmp_path: Path):
     run("perform", "boxing", "-o", "takes")
-    status, out, _ = run("build", "takes/jab.bvh", "-o", "jab.kumite", "--join-height", "0.1")
+    only = ("--layer", "frames", "--join-height", "0.1")
+    status, out, _ = run("build", "takes/jab.bvh", "-o", "jab.kumite", *only)
     assert status == 0
-    for word in ("frames in the graph", "fight by policy", "pelvis height", "will not, because"):
+    for word in ("frames in the graph", "fight by policy", "pelvis height", "was not built"):
         assert word in out, word
     status, out, _ = run("build", "takes/jab.bvh", "-o", "jab.kumite", "--json")
-    worth = json.loads(out)["worth"]
+    told = json.loads(out)
+    worth = told["layers"]["frames"]["worth"]
     assert worth["states"] > 1 and 0 < worth["reached"] <= 1
-    assert {v["kind"] for v in worth["scenes"]} == {
+    assert {v["kind"] for v in told["scenes"]} == {
         "fight by policy", "fight by tree", "avoid", "prepare",
     }  # fmt: skip
     status, out, err = run("build", "takes/jab.bvh", "-o", "x.kumite", "--join-angle", "0")
     assert status == 2 and "angle 0" in err and not Path("x.kumite").exists()
 
 
-def test_verdicts_on_people_are_those_of_the_scenes(boxer: Library, mocap: Path):
+def test_verdicts_on_people_are_those_of_the_scenes(boxer: Layer, mocap: Path):
     """What was seen: the boxer lands blows; of 80 balls he avoids 27, as few ways out are near;
     who runs and kicks now and then has blows, but throws none in 40 s of sparring."""
     assert assess(boxer).verdict("fight by policy").word == "will work"
-    dodger = build_avoidance_library(boxer.clips)
+    dodger = build_avoidance(boxer.clips)
     assert assess(dodger).verdict("avoid").word == "thin"
-    runner = build_library(mocap_files.load(mocap / "cmu" / "127").clip_set())
+    runner = build_frames(mocap_files.load(mocap / "cmu" / "127").clip_set())
     found = assess(runner).verdict("fight by policy")
     assert found.word == "thin" and "from where one stands" in found.why
 
 
 def test_ways_out_that_are_soon_equal_a_count_by_hand():
-    dodgers = builtin_library(None, style="avoidance", level="avoidance")
+    dodgers = builtin_layer(None, style="avoidance", level="avoidance")
     table, fps = dodgers.table, dodgers.clips.fps
     begin, part = dodgers.parts_of_stretch
     total, time = 0.0, 0

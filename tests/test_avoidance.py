@@ -32,9 +32,9 @@ from kumite.cli import app
 from kumite.clip import Clip, ClipSet, Skeleton, concatenate, mirror, resample
 from kumite.errors import KumiteError
 from kumite.graph import (
-    Library,
-    build_action_library,
-    build_library,
+    Layer,
+    build_actions,
+    build_frames,
     find_transitions,
     load_library,
     save_library,
@@ -43,7 +43,7 @@ from kumite.graph.whole import uncut
 from kumite.performer import perform
 from kumite.rotation import from_axis_angle, multiply
 from tests import toys
-from tests.shared import builtin
+from tests.shared import builtin, only
 
 FPS = 60.0
 
@@ -441,7 +441,7 @@ def spread(found: list[tuple[int, int]], clip_start: np.ndarray) -> AvoidancePar
     return AvoidanceParts(start, stop, clip_start)
 
 
-def is_whole(library: Library) -> None:
+def is_whole(library: Layer) -> None:
     """Each stretch has all frames of a part or none."""
     table, parts = library.table, library.avoidance
     for a, b in zip(parts.start, parts.stop):
@@ -472,7 +472,7 @@ def test_no_transition_cuts_a_part(avoider: ClipSet, event: str):
         for a, b in zip(parts.start.tolist(), parts.stop.tolist())
     ]
     assert any(cut)  # so it was needed
-    library = build_library(avoider, event=event, per_second=per_second, avoidance=parts)
+    library = build_frames(avoider, event=event, per_second=per_second, avoidance=parts)
     is_whole(library)
     held = np.unique(library.parts_of_stretch[1])
     assert library.report["avoidance_parts"] == len(parts)
@@ -489,7 +489,7 @@ def test_any_parts_are_kept_whole(avoider: ClipSet, spans: list[tuple[int, int]]
     found = apart([(a, min(a + n, len(short))) for a, n in spans])
     parts = spread(found, short.clip_start)
     try:
-        library = build_library(short, event=event, per_second=4.0, avoidance=parts)
+        library = build_frames(short, event=event, per_second=4.0, avoidance=parts)
     except KumiteError as error:
         assert "too few" in str(error)
         return
@@ -497,7 +497,7 @@ def test_any_parts_are_kept_whole(avoider: ClipSet, spans: list[tuple[int, int]]
 
 
 def test_a_graph_of_actions_keeps_parts_whole(avoider: ClipSet):
-    library = build_action_library(avoider, avoidance=True)
+    library = build_actions(avoider, avoidance=True)
     is_whole(library)
     parts = library.avoidance
     assert len(np.unique(library.parts_of_stretch[1])) >= 0.95 * len(parts)
@@ -508,16 +508,16 @@ def test_a_graph_of_actions_keeps_parts_whole(avoider: ClipSet):
 
 
 def test_a_graph_is_as_it_was_where_nobody_asks(avoider: ClipSet):
-    library = build_library(avoider)
+    library = build_frames(avoider)
     assert len(library.avoidance) == 0 and "avoidance_parts" not in library.report
     assert len(library.parts_of_stretch[1]) == 0
     assert np.array_equal(library.parts_of_stretch[0], np.zeros(len(library.table.first) + 1))
-    none = build_library(avoider, avoidance=no_avoidance(avoider.clip_start))
+    none = build_frames(avoider, avoidance=no_avoidance(avoider.clip_start))
     assert np.array_equal(none.table.stretch, library.table.stretch)
     with pytest.raises(KumiteError, match="avoidance parts: of other clips"):
-        build_library(avoider, avoidance=some([10], [20]))
+        build_frames(avoider, avoidance=some([10], [20]))
     with pytest.raises(KumiteError, match="avoidance parts are of other clips"):
-        Library(
+        Layer(
             library.clips,
             library.contacts,
             library.strikes,
@@ -527,17 +527,17 @@ def test_a_graph_is_as_it_was_where_nobody_asks(avoider: ClipSet):
 
 
 def test_a_library_keeps_its_parts(avoider: ClipSet, tmp_path: Path):
-    library = build_library(avoider, event="both", avoidance=True)
+    library = build_frames(avoider, event="both", avoidance=True)
     path = tmp_path / "a.kumite"
     save_library(path, library)
-    back = load_library(path)
+    back = only(load_library(path))
     assert np.array_equal(back.avoidance.start, library.avoidance.start)
     assert np.array_equal(back.avoidance.stop, library.avoidance.stop)
     assert back.digest == library.digest
-    none = Library(library.clips, library.contacts, library.strikes, library.table, library.report)
+    none = Layer(library.clips, library.contacts, library.strikes, library.table, library.report)
     assert none.digest != library.digest
     save_library(path, none)
-    assert len(load_library(path).avoidance) == 0
+    assert len(only(load_library(path)).avoidance) == 0
 
 
 def line(*cuts: int, clips: tuple[int, ...] = (0, 100)) -> Actions:
@@ -613,7 +613,7 @@ def test_the_performers_ways_out_are_near(level: str):
     assert len(builtin().avoidance) == 0
 
 
-def until_avoidance(library: Library) -> np.ndarray:
+def until_avoidance(library: Layer) -> np.ndarray:
     """Seconds [N] from each state until the middle of the nearest part."""
     table, (begin, part) = library.table, library.parts_of_stretch
     nearest = np.full(len(table.first), np.inf)
@@ -633,19 +633,21 @@ def test_the_command_builds_with_parts(tmp_path: Path):
     assert made.exit_code == 0, made.output
     bvh = sorted(str(p) for p in (tmp_path / "bvh").glob("lean*.bvh"))
     output = str(tmp_path / "a.kumite")
-    build = ["build", *bvh, "-o", output, "--avoidance", "--event", "both"]
+    build = ["build", *bvh, "-o", output, "--layer", "frames", "--avoidance", "--event", "both"]
     done = CliRunner().invoke(app, build)
     assert done.exit_code == 0, done.output
     assert "avoidance parts of" in done.output and "each within one action" in done.output
-    found = len(load_library(output).avoidance)
+    found = len(only(load_library(output)).avoidance)
     actions = str(tmp_path / "actions.txt")
     assert CliRunner().invoke(app, ["segment", *bvh, "-o", actions]).exit_code == 0
     text = Path(actions).read_text()
     Path(actions).write_text(re.sub(r" avoid=\d+-\d+", "", text, count=1))
     for level in ("frames", "actions"):
-        command = ["build", *bvh, "-o", output, "--avoidance", "--level", level]
+        command = ["build", *bvh, "-o", output, "--avoidance", "--layer", level]
         done = CliRunner().invoke(app, [*command, "--actions", actions])
         assert done.exit_code == 0, done.output
-        assert len(load_library(output).avoidance) == found - 1
-    done = CliRunner().invoke(app, ["build", *bvh, "-o", output, "--actions", actions])
+        assert len(only(load_library(output)).avoidance) == found - 1
+    done = CliRunner().invoke(
+        app, ["build", *bvh, "-o", output, "--layer", "frames", "--actions", actions]
+    )
     assert isinstance(done.exception, KumiteError)

@@ -9,19 +9,19 @@ import pytest
 
 from kumite.control.game_tree import GameTree, Player
 from kumite.errors import KumiteError
-from kumite.graph import Library, build_action_library
+from kumite.graph import Layer, build_actions
 from kumite.mocap import load
 from kumite.scene import BoutScene, SceneSettings, load_scene, measure, record
 from tests.shared import builtin
 
 
 @pytest.fixture(scope="module")
-def actions() -> Library:
+def actions() -> Layer:
     """The built-in boxer's actions."""
     return builtin(level="actions")
 
 
-def _fight(actions: Library, **changes) -> BoutScene:
+def _fight(actions: Layer, **changes) -> BoutScene:
     """Boxing with one or the other fighter changed: red={…}, blue={…}."""
     settings = load_scene("boxing").model_dump(exclude_none=True)
     for fighter in settings["fighter"]:
@@ -44,7 +44,7 @@ def _landed(scene: BoutScene, name: str) -> int:
     )
 
 
-def test_two_fight_and_the_log_says_what_was_looked_at(actions: Library):
+def test_two_fight_and_the_log_says_what_was_looked_at(actions: Layer):
     scene = _fight(actions)
     recording = record(scene, 15.0)
     kinds = {e.kind for e in recording.events}
@@ -61,7 +61,7 @@ def test_two_fight_and_the_log_says_what_was_looked_at(actions: Library):
 
 
 def test_the_real_boxer_fights(mocap: Path):
-    real = build_action_library(load(mocap / "boxer").clip_set())
+    real = build_actions(load(mocap / "boxer").clip_set())
     scenes = [_fight(real, seed=seed) for seed in (1, 2)]
     for scene in scenes:
         _run(scene, 15.0)
@@ -71,7 +71,7 @@ def test_the_real_boxer_fights(mocap: Path):
     assert sum(_landed(s, name) for s in scenes for name in s.names) >= 2
 
 
-def test_a_blow_that_lands_brings_its_reaction_and_one_that_is_blocked_does_not(actions: Library):
+def test_a_blow_that_lands_brings_its_reaction_and_one_that_is_blocked_does_not(actions: Layer):
     scene = _fight(actions, seed=3)
     _run(scene, 15.0)
     hits = [e for e in scene.events if e.kind == "hit"]
@@ -81,7 +81,7 @@ def test_a_blow_that_lands_brings_its_reaction_and_one_that_is_blocked_does_not(
     assert reactions == struck
 
 
-def test_who_has_waited_long_attacks_though_it_may_miss(actions: Library):
+def test_who_has_waited_long_attacks_though_it_may_miss(actions: Layer):
     scene = _fight(actions)
     tree, player = scene.tree, scene.players[0]
     calm = [k for k, kind in enumerate(tree.kinds) if kind in ("idle", "transition")][:8]
@@ -93,7 +93,7 @@ def test_who_has_waited_long_attacks_though_it_may_miss(actions: Library):
     assert set(tired[fresh]) == {8 * player.restlessness}
 
 
-def test_the_same_seed_gives_the_same_fight(actions: Library):
+def test_the_same_seed_gives_the_same_fight(actions: Layer):
     def fight(seed: int) -> BoutScene:
         scene = _fight(actions, seed=seed)
         _run(scene, 6.0)
@@ -107,7 +107,7 @@ def test_the_same_seed_gives_the_same_fight(actions: Library):
     assert a.wxyz.tobytes() == c.wxyz.tobytes() and a.events == c.events
 
 
-def test_infighters_are_nearer_than_those_who_keep_away(actions: Library):
+def test_infighters_are_nearer_than_those_who_keep_away(actions: Layer):
     inside = {"style": "infighter"}
     far_off = {"style": "outboxer"}
     for seed in (1, 2):
@@ -117,7 +117,7 @@ def test_infighters_are_nearer_than_those_who_keep_away(actions: Library):
 
 
 @pytest.mark.slow
-def test_who_looks_further_ahead_lands_more(actions: Library):
+def test_who_looks_further_ahead_lands_more(actions: Layer):
     wins = 0
     for seed in range(3):
         scene = _fight(actions, red={"depth": 3}, blue={"depth": 1}, seed=seed)
@@ -126,7 +126,7 @@ def test_who_looks_further_ahead_lands_more(actions: Library):
     assert wins >= 2
 
 
-def test_weights_and_depth_count_from_the_next_decision(actions: Library):
+def test_weights_and_depth_count_from_the_next_decision(actions: Layer):
     scene = _fight(actions, red={"style": "infighter"}, blue={"style": "infighter"})
     controls = {c.name: c for c in scene.controls}
     _run(scene, 6.0)
@@ -139,7 +139,7 @@ def test_weights_and_depth_count_from_the_next_decision(actions: Library):
     assert _run(scene, 8.0)[-60:].mean() > 2.0
 
 
-def test_a_pair_follows_check_points_and_says_what_it_missed(actions: Library):
+def test_a_pair_follows_check_points_and_says_what_it_missed(actions: Layer):
     path = {
         "path": {"shape": "line", "centre": (0, 0), "end": (3.0, 0), "points": 4, "radius": 0.6},
         "style": {"preset": "boxer_path", "place": 1e4},
@@ -156,7 +156,7 @@ def test_a_pair_follows_check_points_and_says_what_it_missed(actions: Library):
 
 
 def test_each_check_point_that_is_missed_is_told_though_one_before_it_was_reached_late(
-    actions: Library,
+    actions: Layer,
 ):
     late = [{"place": (0.0, 0.0), "time": 0.5, "radius": 20.0, "require": ["attack"]}]
     far = [{"place": (40.0, 0.0), "time": t} for t in (6.0, 8.0)]
@@ -168,7 +168,7 @@ def test_each_check_point_that_is_missed_is_told_though_one_before_it_was_reache
     assert reached.data["point"] == 0 and reached.data["late_by"] > 0
 
 
-def test_two_share_a_check_point_by_the_middle_between_them(actions: Library):
+def test_two_share_a_check_point_by_the_middle_between_them(actions: Layer):
     """It is reached though neither is there, and each is to stand on its own side of it."""
     middle = np.array([0.3, 0.1])
     for shared in (True, False):
@@ -187,7 +187,7 @@ def test_two_share_a_check_point_by_the_middle_between_them(actions: Library):
         assert arrived == [shared, shared]
 
 
-def test_wrong_fights_are_refused(actions: Library, library: Library):
+def test_wrong_fights_are_refused(actions: Layer, library: Layer):
     with pytest.raises(KumiteError, match="one of frames; expected one of whole actions"):
         BoutScene(load_scene("boxing"), library)
     with pytest.raises(KumiteError, match="no action is called 'flying_kick'"):
@@ -204,7 +204,7 @@ def test_wrong_fights_are_refused(actions: Library, library: Library):
         Player(depth=0)
 
 
-def test_decisions_are_those_of_the_whole_tree(actions: Library):
+def test_decisions_are_those_of_the_whole_tree(actions: Layer):
     """What bounds skip changes no decision."""
     tree = GameTree(actions)
     scene = _fight(actions, seed=5)

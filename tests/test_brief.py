@@ -13,18 +13,18 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.scene import LiveScene, Recording, load_scene, record
 from tests import toys
 from tests.test_docs import PACKAGES
 
 
 @pytest.fixture(scope="module")
-def fight(library: Library) -> Recording:
+def fight(library: Layer) -> Recording:
     return record(LiveScene(load_scene("sparring"), library, seed=3), 4.0)
 
 
-def test_values_are_shown_in_two_lines_at_most(library: Library, fight: Recording):
+def test_values_are_shown_in_two_lines_at_most(library: Layer, fight: Recording):
     clip = library.clips.clip(0)
     values = (clip, library.clips, clip.skeleton, library, fight, library.table, library.strikes)
     for value in values:
@@ -43,11 +43,11 @@ def test_everything_public_that_holds_arrays_is_brief(package: str):
         value = getattr(module, name)
         if isinstance(value, type) and dataclasses.is_dataclass(value):
             types = [str(f.type) for f in dataclasses.fields(value)]
-            if any(re.search(r"ndarray|Clip|Library|Skeleton", t) for t in types):
+            if any(re.search(r"ndarray|Clip|Layer|Skeleton", t) for t in types):
                 assert value.__repr__.__module__ == "kumite.brief", name
 
 
-def test_notebooks_show_a_picture(library: Library, fight: Recording):
+def test_notebooks_show_a_picture(library: Layer, fight: Recording):
     few = toys.still(20)
     for value in (few, library.clips, library, fight):
         show: Callable[[], str] = getattr(value, "_repr_html_")  # noqa: B009 - added by @pictured

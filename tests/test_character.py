@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from kumite import rotation
 from kumite.clip import SIDES, forward_kinematics
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.kernels import character as kernels
 from kumite.kernels import pose
 from kumite.scene.live import RECOIL
@@ -135,7 +135,7 @@ def test_what_is_shown_goes_on_through_a_join(seed):
     assert rotation.wrap_angle(stood[2] - stands[2]) == pytest.approx(0, abs=1e-9)
 
 
-def _walk(library: Library, frames: int, seed: int):
+def _walk(library: Layer, frames: int, seed: int):
     """A cast of two that takes random actions: positions, contacts and joins by frame."""
     cast, rng = Cast(library, 2), np.random.default_rng(seed)
     table = library.table
@@ -162,14 +162,14 @@ def _walk(library: Library, frames: int, seed: int):
     return cast, *(np.array(x) for x in (position, contacts, root, joined))
 
 
-def test_bones_keep_their_lengths(library: Library):
+def test_bones_keep_their_lengths(library: Layer):
     _, position, *_ = _walk(library, 200, 1)
     s = library.clips.skeleton
     bones = np.linalg.norm(position[:, :, 1:] - position[:, :, s.parents[1:]], axis=-1)
     assert np.allclose(bones, np.linalg.norm(s.offsets[1:], axis=1), atol=1e-9)
 
 
-def test_without_joins_the_capture_is_played_as_it_is(library: Library):
+def test_without_joins_the_capture_is_played_as_it_is(library: Layer):
     cast = Cast(library, 1)
     table, clips = library.table, library.clips
     state = next(
@@ -188,7 +188,7 @@ def test_without_joins_the_capture_is_played_as_it_is(library: Library):
         assert np.allclose(cast.position[0], position[cast.frame[0]], atol=2e-3)
 
 
-def test_joins_do_not_jump(library: Library):
+def test_joins_do_not_jump(library: Layer):
     """Poses, and the speed of every joint, change at a join as they do elsewhere."""
     _, position, _, _, joined = _walk(library, 2000, 2)
     fps = library.clips.fps
@@ -204,7 +204,7 @@ def test_joins_do_not_jump(library: Library):
     assert change[at_join].max() < 1.5 * natural.max()
 
 
-def test_planted_feet_hold(library: Library):
+def test_planted_feet_hold(library: Layer):
     _, position, contacts, *_ = _walk(library, 2000, 3)
     s = library.clips.skeleton
     fps = library.clips.fps
@@ -224,7 +224,7 @@ def test_planted_feet_hold(library: Library):
         assert skate(position[:, k], contacts[:, k]) < 1.5 * yardstick + 0.01
 
 
-def test_shifting_a_body_leaves_its_planted_feet(library: Library):
+def test_shifting_a_body_leaves_its_planted_feet(library: Layer):
     cast = Cast(library, 1)
     states = library.table.state_frame
     both = int(np.flatnonzero(library.contacts.on_ground[states].all(axis=1))[0])
@@ -240,7 +240,7 @@ def test_shifting_a_body_leaves_its_planted_feet(library: Library):
     assert np.allclose(cast.position[0, feet], before, atol=2e-3)
 
 
-def test_a_struck_head_gives_way_along_the_blow_and_recovers(library: Library):
+def test_a_struck_head_gives_way_along_the_blow_and_recovers(library: Layer):
     cast = Cast(library, 1)
     cast.place(0, 0, np.zeros(3))
     cast.show(0.0)
@@ -270,7 +270,7 @@ def _elbow(cast: Cast, side: str) -> float:
 
 
 @pytest.mark.parametrize("part", ["upper_arm", "forearm", "hand"])
-def test_a_struck_arm_gives_way_and_recovers(library: Library, part: str):
+def test_a_struck_arm_gives_way_and_recovers(library: Layer, part: str):
     """A blow of 6 m/s against a guard, beside the same guard that nobody strikes."""
     joint = library.clips.skeleton.joint
     far = {"upper_arm": "forearm", "forearm": "hand", "hand": "hand"}[part]
@@ -301,7 +301,7 @@ def test_a_struck_arm_gives_way_and_recovers(library: Library, part: str):
         assert 0.002 < max(trunk) < 0.5 * away.max()  # the trunk has its share
 
 
-def test_a_blow_that_would_open_an_elbow_is_left_to_the_shoulder(library: Library):
+def test_a_blow_that_would_open_an_elbow_is_left_to_the_shoulder(library: Layer):
     joint = library.clips.skeleton.joint
     cast = Cast(library, 1)
     cast.place(0, 0, np.zeros(3))
@@ -316,7 +316,7 @@ def test_a_blow_that_would_open_an_elbow_is_left_to_the_shoulder(library: Librar
         assert np.isfinite(cast.wxyz).all()
 
 
-def test_many_hard_blows_turn_no_joint_out_of_its_bounds(library: Library):
+def test_many_hard_blows_turn_no_joint_out_of_its_bounds(library: Layer):
     joint = library.clips.skeleton.joint
     cast = Cast(library, 1)
     cast.place(0, 0, np.zeros(3))
@@ -335,7 +335,7 @@ def test_many_hard_blows_turn_no_joint_out_of_its_bounds(library: Library):
     assert np.abs(cast._offsets.reaction).max() < 1e-4
 
 
-def test_a_waist_that_the_pelvis_carries_gives_way_too(library: Library):
+def test_a_waist_that_the_pelvis_carries_gives_way_too(library: Layer):
     cast = Cast(library, 1)
     cast.place(0, 0, np.zeros(3))
     cast.show(0.0)
@@ -350,7 +350,7 @@ def test_a_waist_that_the_pelvis_carries_gives_way_too(library: Library):
     assert max(moved) > 0.03
 
 
-def test_many_characters_are_what_few_are(library: Library):
+def test_many_characters_are_what_few_are(library: Layer):
     """The kernel that runs on all cores gives the bytes of the one that does not."""
     few, many = Cast(library, 1), Cast(library, kernels.MANY + 3)
     for cast in (few, many):

@@ -19,16 +19,17 @@ from kumite.cli.app import app
 from kumite.cli.progress import Lines, Stages
 from kumite.clip import forward_kinematics
 from kumite.export.bvh import write_bvh
-from kumite.graph import Library, load_library, save_library
-from kumite.graph.library import VERSION
+from kumite.graph import Layer, load_library, save_library
+from kumite.graph.library_file import VERSION
 from kumite.mocap import load
 from kumite.performer import STYLES, perform
 from kumite.scene import LiveScene, load_recording
 from tests import toys
+from tests.shared import only
 
 
 @pytest.fixture(scope="module")
-def built(library: Library, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def built(library: Layer, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A library file, in a folder of its own."""
     path = tmp_path_factory.mktemp("built") / "built.kumite"
     save_library(path, library)
@@ -36,7 +37,7 @@ def built(library: Library, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def built_whole(whole: Library, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def built_whole(whole: Layer, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A library of whole actions."""
     path = tmp_path_factory.mktemp("built") / "whole.kumite"
     save_library(path, whole)
@@ -50,7 +51,7 @@ def kumite(run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     return run
 
 
-def test_from_mocap_files_to_a_fight(kumite, library: Library, tmp_path: Path):
+def test_from_mocap_files_to_a_fight(kumite, library: Layer, tmp_path: Path):
     """info → build → run → metrics → export, on BVH files."""
     for clip in library.clips:
         write_bvh(tmp_path / "mocap" / f"{clip.name}.bvh", clip)
@@ -93,7 +94,7 @@ def test_from_mocap_files_to_a_fight(kumite, library: Library, tmp_path: Path):
 
 
 def test_from_mocap_files_to_a_graph_of_actions(
-    kumite, whole: Library, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    kumite, whole: Layer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     """segment → an edit → build --level actions → info → studio, on BVH files."""
     for clip in list(whole.clips)[:6]:
@@ -105,10 +106,10 @@ def test_from_mocap_files_to_a_graph_of_actions(
     label = line.split()[-2]
     changed = line.replace(f" {label} ", ' "my own" ')
     (tmp_path / "mine.txt").write_text(text.replace(line, changed))
-    options = ["--level", "actions", "--actions", "mine.txt", "--alike", "1.5", "--most-ways", "9"]
+    options = ["--layer", "actions", "--actions", "mine.txt", "--alike", "1.5", "--most-ways", "9"]
     status, text, err = kumite("build", "mocap", "-o", "my.kumite", *options)
     assert status == 0, err
-    found = load_library(tmp_path / "my.kumite")
+    found = only(load_library(tmp_path / "my.kumite"))
     assert found.actions is not None and "my own" in found.actions.label
     assert f"{len(found.actions)} actions, {found.report['stretches']} of them connected" in text
     assert f"{found.report['nodes']} nodes of postures alike within 1.5 rad" in text
@@ -118,10 +119,10 @@ def test_from_mocap_files_to_a_graph_of_actions(
     assert status == 0 and len(rows) >= 3 and all(row in text for row in rows)
     assert all(f"{c.name} {c.seconds:.3g}"[:-1] in again for c in found.clips)
     values = json.loads(kumite("info", "my.kumite", "--json", "--plot", "hits.png")[1])
-    assert values["level"] == "actions" and values["clips"] == 6
+    assert list(values["layers"]) == ["actions"] and values["clips"] == 6
     ways = np.diff(found.table.action_start)
     assert ways.max() == 9
-    assert values["ways_on"] == {
+    assert values["layers"]["actions"]["ways_on"] == {
         "least": ways.min(), "most": ways.max(), "mean": round(ways.mean(), 4),
     }  # fmt: skip
     assert (tmp_path / "hits.png").stat().st_size > 10_000
@@ -131,13 +132,13 @@ def test_from_mocap_files_to_a_graph_of_actions(
     assert status == 0 and "http://127.0.0.1:" in text, err
 
 
-def test_a_library_of_frames_says_what_it_holds(kumite, built: Path, library: Library):
+def test_a_library_of_frames_says_what_it_holds(kumite, built: Path, library: Layer):
     status, text, _ = kumite("info", built)
     r = library.report
     assert status == 0 and f"{r['states']} states, {r['actions']} actions of" in text
     assert f"mean join cost {r['mean_join_cost']:.2f}" in text
     values = json.loads(kumite("info", built, "--json")[1])
-    assert values["level"] == "frames" and values["states"] == r["states"]
+    assert values["layers"]["frames"]["states"] == r["states"]
 
 
 def test_policies_plan_on_a_graph_of_actions(kumite, built_whole: Path):
@@ -296,7 +297,8 @@ def test_two_skeletons_in_one_library(kumite, tmp_path):
     assert status == 0 and len(json.loads(text)["clips"]) == 2
 
 
-WHOLE = ["build", "still.bvh", "-o", "x.kumite", "--level", "actions"]
+FRAMES = ["build", "still.bvh", "-o", "x.kumite", "--layer", "frames"]
+WHOLE = ["build", "still.bvh", "-o", "x.kumite", "--layer", "actions"]
 
 
 @pytest.mark.parametrize(
@@ -309,14 +311,11 @@ WHOLE = ["build", "still.bvh", "-o", "x.kumite", "--level", "actions"]
         (["build", "still.bvh", "-o", "x.kumite", "--event", "hop"], "unknown event 'hop'"),
         (["build", "still.bvh", "-o", "x.kumite", "--per-second", "0"], "per_second"),
         (["build", "still.bvh", "-o", "x.kumite", "--per-second", "inf"], "per_second inf"),
-        (["build", "still.bvh", "-o", "x.kumite", "--level", "action"], "did you mean 'actions'"),
-        (["build", "still.bvh", "-o", "x.kumite", "--alike", "1"], "--alike: of --level actions"),
-        (
-            ["build", "still.bvh", "-o", "x.kumite", "--actions", "a.txt"],
-            "--actions: of --level actions; expected none with --level frames",
-        ),
-        ([*WHOLE, "--event", "left"], "--event: of --level frames"),
-        ([*WHOLE, "--per-second", "9"], "--per-second: of --level frames"),
+        (["build", "still.bvh", "-o", "x.kumite", "--layer", "action"], "did you mean 'actions'"),
+        ([*FRAMES, "--alike", "1"], "--alike: of --layer actions or preparation"),
+        ([*FRAMES, "--actions", "a.txt"], "--actions: of other layers; expected none with"),
+        ([*WHOLE, "--event", "left"], "--event: of --layer frames"),
+        ([*WHOLE, "--per-second", "9"], "--per-second: of --layer frames"),
         ([*WHOLE, "--most-ways", "1"], "most_ways 1; expected at least 2"),
         ([*WHOLE, "--alike", "-1"], "alike -1.0; expected more than 0 rad"),
         ([*WHOLE, "--actions", "none.txt"], "none.txt: cannot be read"),
@@ -324,7 +323,7 @@ WHOLE = ["build", "still.bvh", "-o", "x.kumite", "--level", "actions"]
         (WHOLE, "too few actions for a graph"),
         (["info", "BUILT", "--fps", "30"], "--fps: of motion capture"),
         (["info", "none.kumite"], "none.kumite: cannot be read"),
-        (["studio", "BUILT"], "a library of frames, without actions; expected one built with"),
+        (["studio", "BUILT"], "the library has no layer 'actions' (it was not built)"),
         (["studio", "BUILT", "--count", "3"], "--count: of a scene"),
         (["studio", "none.kumite"], "none.kumite: cannot be read"),
         (
@@ -447,7 +446,7 @@ def test_a_count_beyond_room_or_memory_is_refused(
 
 
 @pytest.mark.parametrize("scene", ["sparring", "target", "crowd"])
-def test_a_library_without_blows_is_refused(kumite, library: Library, tmp_path, scene):
+def test_a_library_without_blows_is_refused(kumite, library: Layer, tmp_path, scene):
     """Walking people, say: nobody in it can strike, so no scene is run with it."""
     strikes = library.strikes
     rows = {f: getattr(strikes, f)[:0] for f in ("frame", "limb", "start", "stop", "velocity")}
@@ -487,7 +486,7 @@ def test_the_studio_ends_by_itself(kumite, built: Path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_bench_prints_its_rows(kumite, library: Library, tmp_path):
+def test_bench_prints_its_rows(kumite, library: Layer, tmp_path):
     for clip in library.clips:
         write_bvh(tmp_path / "mocap" / f"{clip.name}.bvh", clip)
     status, text, err = kumite("bench", "mocap", "--only", "approach", "--json")
@@ -647,12 +646,15 @@ def test_all_balls_are_thrown(kumite, tmp_path: Path):
     assert status == 2 and "expected at most 351" in err
 
 
-def test_a_recording_says_what_it_holds(kumite, built: Path, library: Library):
+def test_a_recording_says_what_it_holds(kumite, built: Path, library: Layer):
     kumite("run", "sparring", "-l", built, "--seconds", "4", "--seed", "7", "-o", "a.rec")
     status, text, _ = kumite("info", "a.rec")
     assert status == 0 and "Sparring, seed 7: 4.0 s" in text and "characters: red, blue" in text
     told = json.loads(kumite("info", "a.rec", "--json")[1])
-    assert told["library"] == json.loads(kumite("info", built, "--json")[1])["digest"]
+    assert (
+        told["library"]
+        == json.loads(kumite("info", built, "--json")[1])["layers"]["frames"]["digest"]
+    )
     assert told["joints"] == len(library.clips.skeleton)
     assert told["events"]["strike"] >= told["events"]["hit"]
     status, _, err = kumite("info", "a.rec", "--fps", "30")

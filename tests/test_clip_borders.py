@@ -25,7 +25,7 @@ from kumite.annotate import (
 )
 from kumite.clip import Clip, ClipSet, concatenate, runs
 from kumite.errors import KumiteError
-from kumite.graph import build_avoidance_library, find_avoiding_transitions, find_targets
+from kumite.graph import build_avoidance, find_avoiding_transitions, find_targets
 from kumite.performer import perform
 
 CASES = Path(__file__).parent / "cases"
@@ -165,4 +165,4 @@ def test_nothing_enters_a_part_that_begins_with_its_clip(pieces: list[Clip]):
     assert not np.isin(made.target, clips.clip_start).any()
     only = AvoidanceParts(parts.start[first], parts.stop[first], clips.clip_start)
     with pytest.raises(KumiteError, match="begins with its clip"):
-        build_avoidance_library(clips, only)
+        build_avoidance(clips, only)

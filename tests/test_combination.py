@@ -24,7 +24,7 @@ from kumite.control.combination import (
 )
 from kumite.control.combination_file import read_table, write_table
 from kumite.errors import KumiteError
-from kumite.graph import ActionTable, Library
+from kumite.graph import ActionTable, Layer
 from kumite.performer import perform
 from kumite.performer.boxing import BOXING
 from kumite.performer.moves import Style
@@ -111,7 +111,7 @@ TABLE = ActionTable(  # a graph of one action: annotations do not look at it
 )
 
 
-def performed(style: Style, ways: dict) -> tuple[Library, Actions]:
+def performed(style: Style, ways: dict) -> tuple[Layer, Actions]:
     """Moves one after the other, with their true actions."""
     score = [as_written(style.find(label)) for label in ways]
     clip, truth = perform_take("take", score, style, rng=np.random.default_rng(0))
@@ -132,11 +132,11 @@ def performed(style: Style, ways: dict) -> tuple[Library, Actions]:
         tuple(a.label for a in own),
         clips.clip_start,
     )
-    return Library(clips, find_contacts(clips), find_strikes(clips), TABLE), actions
+    return Layer(clips, find_contacts(clips), find_strikes(clips), TABLE), actions
 
 
 @pytest.fixture(scope="module")
-def boxing() -> tuple[Library, Actions]:
+def boxing() -> tuple[Layer, Actions]:
     return performed(BOXING, {**ATTACKS, **DEFENCES})
 
 
@@ -194,7 +194,7 @@ def test_every_authored_blow_is_annotated_where_it_lands(style: str, most: float
         ("blow",) * len(blows),
         clips.clip_start,
     )
-    library = Library(clips, find_contacts(clips), strikes, TABLE)
+    library = Layer(clips, find_contacts(clips), strikes, TABLE)
     found = annotate_actions(library, actions).positions
     rest = clips.world[0][:, [clips.skeleton.joint(role) for role in ("head", "pelvis")], 1]
     top, bottom = np.median(rest, axis=0)

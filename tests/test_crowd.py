@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.kernels import crowd as kernels
 from kumite.kernels import near
 from kumite.scene import LiveScene, SceneSettings, live, load_scene, measure, record, with_count
@@ -73,7 +73,7 @@ def test_everyone_has_an_opponent_and_pairs_are_mutual(seed, count):
     assert (~mutual).sum() <= count % 2
 
 
-def test_thirty_boxers_fight_each_with_the_nearest(library: Library):
+def test_thirty_boxers_fight_each_with_the_nearest(library: Layer):
     scene = LiveScene(load_scene("crowd"), library, seed=1)
     fight = record(scene, 20.0)
     found = measure(fight)
@@ -88,7 +88,7 @@ def test_thirty_boxers_fight_each_with_the_nearest(library: Library):
     assert min(c.joins for c in found.characters) >= 3
 
 
-def test_many_at_once_are_as_one_after_the_other(library: Library, monkeypatch: pytest.MonkeyPatch):
+def test_many_at_once_are_as_one_after_the_other(library: Layer, monkeypatch: pytest.MonkeyPatch):
     """The kernel on all cores gives the bytes of the one that is not."""
     frames = []
     for many in (2, 10**6):
@@ -101,7 +101,7 @@ def test_many_at_once_are_as_one_after_the_other(library: Library, monkeypatch: 
     assert frames[0][1].tobytes() == frames[1][1].tobytes()
 
 
-def test_one_who_aims_at_the_nearest_among_named_ones_aims_at_another(library: Library):
+def test_one_who_aims_at_the_nearest_among_named_ones_aims_at_another(library: Layer):
     characters = [
         {"name": "a", "position": (0, 0), "aims_at": "b"},
         {"name": "b", "position": (0, 1.2), "aims_at": "a"},
@@ -116,7 +116,7 @@ def test_one_who_aims_at_the_nearest_among_named_ones_aims_at_another(library: L
     assert any(e.kind == "strike" and e.character == "third" for e in scene.events)
 
 
-def test_bodies_of_different_pairs_keep_apart(library: Library):
+def test_bodies_of_different_pairs_keep_apart(library: Layer):
     """Two pairs put into each other: the other pair is minded too, not the opponent alone."""
     corners = [(0.0, -0.6), (0.0, 0.6), (0.35, -0.6), (0.35, 0.6)]
     characters = [
@@ -137,7 +137,7 @@ def test_bodies_of_different_pairs_keep_apart(library: Library):
     assert late.min() > 0.25 and np.median(late) > 0.45
 
 
-def test_counts_that_make_no_sense_or_do_not_fit_are_refused(library: Library, monkeypatch):
+def test_counts_that_make_no_sense_or_do_not_fit_are_refused(library: Layer, monkeypatch):
     crowd = load_scene("crowd")
     with pytest.raises(KumiteError, match="expected a scene with a"):
         with_count(load_scene("sparring"), 5)

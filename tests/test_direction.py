@@ -10,12 +10,12 @@ from kumite.control.game_tree import OUTSIDE, Player
 from kumite.control.routes import through
 from kumite.control.styles import NAMES
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.scene import BoutScene, SceneSettings, load_scene
 from kumite.scene.controls import SPANS, OrderControl, heed
 
 
-def fight(fighters: Library, *, seed: int = 0, depth: int = 1, **red) -> BoutScene:
+def fight(fighters: Layer, *, seed: int = 0, depth: int = 1, **red) -> BoutScene:
     """Boxing at a small depth, with something of red's changed."""
     settings = load_scene("boxing").model_dump(exclude_none=True)
     for fighter in settings["fighter"]:
@@ -44,7 +44,7 @@ def share(scene: BoutScene, decisions: list, name: str) -> float:
     return float(np.mean([name in names for names in of]))
 
 
-def test_every_weight_can_be_tuned(fighters: Library):
+def test_every_weight_can_be_tuned(fighters: Layer):
     scene = fight(fighters)
     controls = {c.field: c for c in scene.controls_of(0)}
     assert set(controls) == {*NAMES, "depth", "boredom", "restlessness"}
@@ -62,7 +62,7 @@ def test_every_weight_can_be_tuned(fighters: Library):
     assert next(c for c in wide.controls_of(0) if c.field == "place").maximum == 1e7
 
 
-def test_a_heading_brings_its_weight_and_the_weight_a_heading(fighters: Library):
+def test_a_heading_brings_its_weight_and_the_weight_a_heading(fighters: Layer):
     scene = fight(fighters)
     red, blue = ({c.field: c for c in scene.controls_of(k)} for k in range(2))
     red["preferred_heading"].set(90.0)
@@ -78,7 +78,7 @@ def test_a_heading_brings_its_weight_and_the_weight_a_heading(fighters: Library)
     assert np.mean(off[-150:]) < np.pi / 3  # +X, though the opponent is not there
 
 
-def test_wanted_and_unwanted_count_from_the_next_decision(fighters: Library):
+def test_wanted_and_unwanted_count_from_the_next_decision(fighters: Layer):
     scene = fight(fighters)
     assert share(scene, run(scene, 8.0), "attack") > 0.5
     assert heed(scene.players[0], "requirement") is not None
@@ -91,7 +91,7 @@ def test_wanted_and_unwanted_count_from_the_next_decision(fighters: Library):
     assert share(scene, run(scene, 8.0), "idle") > 0.8
 
 
-def test_only_the_action_set_is_chosen_and_what_is_not_says_so(fighters: Library):
+def test_only_the_action_set_is_chosen_and_what_is_not_says_so(fighters: Layer):
     scene = fight(fighters, depth=2)
     run(scene, 3.0)
     order(scene, "only").set(["transition"])
@@ -106,14 +106,14 @@ def test_only_the_action_set_is_chosen_and_what_is_not_says_so(fighters: Library
     assert not any("outside_set" in e.data for e in run(scene, 3.0))
 
 
-def test_the_scene_file_gives_the_action_set(fighters: Library):
+def test_the_scene_file_gives_the_action_set(fighters: Layer):
     scene = fight(fighters, only=["transition", "idle"])
     for e in run(scene, 5.0):
         inside = scene.tree.kinds[e.data["stretch"]] in ("transition", "idle")
         assert inside != e.data.get("outside_set", False)
 
 
-def test_what_is_refused_leaves_all_as_it_was(fighters: Library):
+def test_what_is_refused_leaves_all_as_it_was(fighters: Layer):
     scene = fight(fighters, unwanted=["attack"])
     kinds = set(scene.tree.kinds) - {"reaction"}
     for field, names, said in (
@@ -141,7 +141,7 @@ def test_what_is_refused_leaves_all_as_it_was(fighters: Library):
         Player(restlessness=-1.0)
 
 
-def test_a_route_is_followed_from_when_it_is_given(fighters: Library):
+def test_a_route_is_followed_from_when_it_is_given(fighters: Layer):
     scene = fight(fighters, style={"preset": "boxer_path", "place": 1e6})
     scene.players[1].style = scene.players[1].style.changed(place=0.0)
     run(scene, 4.0)
@@ -160,7 +160,7 @@ def test_a_route_is_followed_from_when_it_is_given(fighters: Library):
     assert not [e for e in scene.events if e.kind == "missed" and e.data["point"] > 1]
 
 
-def test_a_check_point_is_moved_and_what_is_done_stays_done(fighters: Library):
+def test_a_check_point_is_moved_and_what_is_done_stays_done(fighters: Layer):
     scene = fight(fighters, style={"preset": "boxer_path", "place": 1e6})
     x, _, z = scene.root_position[0]
     scene.set_route("red", through([(x, z), (x + 9.0, z), (x + 12.0, z)]))
@@ -176,7 +176,7 @@ def test_a_check_point_is_moved_and_what_is_done_stays_done(fighters: Library):
     assert scene.progress[0].route.points[1].place == (x + 1.5, z)
 
 
-def test_told_the_same_the_same_seed_gives_the_same_bytes(fighters: Library):
+def test_told_the_same_the_same_seed_gives_the_same_bytes(fighters: Layer):
     def told() -> BoutScene:
         scene = fight(fighters, seed=4)
         run(scene, 2.0)

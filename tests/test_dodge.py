@@ -16,7 +16,7 @@ from kumite.annotate import AvoidanceParts, no_avoidance
 from kumite.body import lay_body
 from kumite.control.avoidance import Avoidance, AvoidanceSearch, Outcome, Plan
 from kumite.errors import KumiteError
-from kumite.graph import build_avoidance_library, find_avoiding_transitions
+from kumite.graph import build_avoidance, find_avoiding_transitions
 from kumite.scene import dodgers
 from kumite.scene.balls import Balls, capsules_of, velocity_to
 from kumite.scene.dodge import DodgeScene
@@ -311,13 +311,13 @@ def test_graphs_that_make_no_sense(wrong):
 def test_no_parts_no_graph():
     clips = few().clips
     with pytest.raises(KumiteError, match="no avoidance parts"):
-        build_avoidance_library(clips, no_avoidance(clips.clip_start))
+        build_avoidance(clips, no_avoidance(clips.clip_start))
     others = AvoidanceParts(np.array([1]), np.array([3]), np.array([0, 9]))
     with pytest.raises(KumiteError, match="of other clips"):
-        build_avoidance_library(clips, others)
+        build_avoidance(clips, others)
     still = toys.clip_set([90])
     with pytest.raises(KumiteError, match="no avoidance parts"):
-        build_avoidance_library(still)
+        build_avoidance(still)
 
 
 def test_settings_that_make_no_sense():

@@ -12,7 +12,7 @@ from kumite.control.attack import Attack, from_limbs
 from kumite.control.avoidance import AvoidanceSearch, Standing
 from kumite.control.counter import CounterSearch
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.rotation import rotate
 from kumite.scene import EvasionScene, builtin_scenes, measure, record
 from kumite.scene.attackers import recorded_attack
@@ -24,17 +24,17 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def avoiding() -> Library:
+def avoiding() -> Layer:
     return builtin("avoidance", "avoidance")
 
 
 @pytest.fixture(scope="module")
-def swordsman() -> Library:
+def swordsman() -> Layer:
     return builtin("sword")
 
 
 @pytest.fixture(scope="module")
-def blades(avoiding: Library, swordsman: Library) -> EvasionScene:
+def blades(avoiding: Layer, swordsman: Layer) -> EvasionScene:
     return EvasionScene(builtin_scenes()["blades"], avoiding, swordsman)
 
 

@@ -15,14 +15,15 @@ from kumite.clip import LIMBS, Clip, ClipSet, concatenate
 from kumite.errors import KumiteError
 from kumite.export.bvh import write_bvh
 from kumite.graph import (
-    Library,
-    build_preparation_library,
+    Layer,
+    build_preparation,
     find_targets,
     load_library,
     marked_targets,
 )
 from kumite.graph.preparing import KINDS, Preparing
 from kumite.performer import perform
+from tests.shared import only
 
 TAKES = ("duck_under", "jump_over", "front_kick")
 
@@ -41,7 +42,7 @@ def row(clip: str, start: int, stop: int, label: str, more: str = "") -> str:
     return f"{clip} {start} {stop} transition - forward {label} {more}".rstrip() + "\n"
 
 
-def prepared(library: Library) -> Preparing:
+def prepared(library: Layer) -> Preparing:
     assert library.preparing is not None
     return library.preparing
 
@@ -182,15 +183,19 @@ def files(takes: ClipSet, made, tmp_path_factory: pytest.TempPathFactory) -> Pat
 
 
 def test_build_finds_targets_by_itself(run, files: Path, tmp_path: Path):
-    code, text, err = run("build", files, "-o", "p.kumite", "--level", "preparation", "--most", 1)
+    code, text, err = run("build", files, "-o", "p.kumite", "--layer", "preparation", "--most", 1)
     assert code == 0, err
     assert "3 target motions:" in text and "under: gets under a bar" in text
     assert "over: gets over a hurdle 0." in text
     assert "right_foot_kick: strikes with the right foot" in text
     code, told, _ = run("info", "p.kumite", "--json")
     values = json.loads(told)
-    assert code == 0 and values["level"] == "preparation"
-    assert {t["kind"] for t in values["target_motions"]} == {"strike", "under", "over"}
+    assert code == 0 and list(values["layers"]) == ["preparation"]
+    assert {t["kind"] for t in values["layers"]["preparation"]["target_motions"]} == {
+        "strike",
+        "under",
+        "over",
+    }
     code, text, _ = run("info", "p.kumite")
     assert code == 0 and "cores: " in text
 
@@ -200,10 +205,10 @@ def test_build_takes_marks_from_a_file(run, files: Path, tmp_path: Path):
         row("duck_under", 509, 654, "duck", "mark=536")
         + row("jump_over", 570, 640, "jump", "mark=598")
     )
-    build = ("build", files, "-o", "p.kumite", "--level", "preparation", "--actions", "a.txt")
+    build = ("build", files, "-o", "p.kumite", "--layer", "preparation", "--actions", "a.txt")
     code, text, err = run(*build, "--alike", 1.0, "--threshold", 1e-9)
     assert code == 0, err
-    library = load_library(tmp_path / "p.kumite")
+    library = only(load_library(tmp_path / "p.kumite"))
     assert prepared(library).hierarchy.targets.label == ("duck", "jump")
     assert prepared(library).hierarchy.alike == 1.0 and library.report["threshold"] == 1e-9
     for t, label in enumerate(("duck", "jump")):
@@ -215,11 +220,11 @@ def test_build_takes_marks_from_a_file(run, files: Path, tmp_path: Path):
 
 def test_build_for_preparation_is_refused(run, files: Path, tmp_path: Path):
     (tmp_path / "a.txt").write_text(row("duck_under", 509, 654, "duck", "mark=536"))
-    build = ("build", files, "-o", "p.kumite", "--level")
+    build = ("build", files, "-o", "p.kumite", "--layer")
     for arguments, wrong in (
-        (("preparation", "--most-ways", 3), "--most-ways: of --level actions"),
-        (("preparation", "--avoidance"), "--avoidance: of other levels"),
-        (("frames", "--threshold", 3), "--threshold: of --level preparation"),
+        (("preparation", "--most-ways", 3), "--most-ways: of --layer actions"),
+        (("preparation", "--avoidance"), "--avoidance: of --layer frames or actions"),
+        (("frames", "--threshold", 3), "--threshold: of --layer preparation"),
         (("preparation", "--most", 3, "--actions", "a.txt"), "--most: of targets that are found"),
         (("preparation", "--threshold", -1), "threshold -1.0 rad²"),
         (("preparation", "--alike", 0), "alike 0.0 rad"),
@@ -237,9 +242,9 @@ def test_build_for_preparation_is_refused(run, files: Path, tmp_path: Path):
 def test_real_clips_are_built_by_themselves_and_from_a_file(run, mocap: Path, tmp_path: Path):
     names = "1_walk_crawl_walk 1_run_straight_1 1_flying_kick 3_walk 3_pass_jump 3_walk_stop_walk"
     sources = [mocap / "woody" / f"{name}.amc" for name in names.split()]
-    code, _, err = run("build", *sources, "-o", "p.kumite", "--level", "preparation")
+    code, _, err = run("build", *sources, "-o", "p.kumite", "--layer", "preparation")
     assert code == 0, err
-    library = load_library(tmp_path / "p.kumite")
+    library = only(load_library(tmp_path / "p.kumite"))
     preparing, clips = prepared(library), library.clips
     targets = preparing.hierarchy.targets
     assert {"stand", "walk"} <= set(preparing.hierarchy.cores.label)
@@ -260,10 +265,10 @@ def test_real_clips_are_built_by_themselves_and_from_a_file(run, mocap: Path, tm
         + row("3_pass_jump", 645, 735, "jump", "mark=675")
     )
     code, _, err = run(
-        "build", *sources, "-o", "q.kumite", "--level", "preparation", "--actions", "a.txt"
+        "build", *sources, "-o", "q.kumite", "--layer", "preparation", "--actions", "a.txt"
     )
     assert code == 0, err
-    marked = prepared(load_library(tmp_path / "q.kumite"))
+    marked = prepared(only(load_library(tmp_path / "q.kumite")))
     assert marked.hierarchy.targets.label == ("crawl", "jump")
     assert [KINDS[k] for k in marked.kind] == ["under", "over"]
 
@@ -273,7 +278,7 @@ def test_a_boxers_targets_are_blows_and_ducks(mocap: Path):
     clips = mocap_files.load(mocap / "boxer").clip_set()
     contacts, strikes = find_contacts(clips), find_strikes(clips)
     targets, cycles = find_targets(clips, contacts, strikes)
-    library = build_preparation_library(clips, targets, cycles, contacts=contacts, strikes=strikes)
+    library = build_preparation(clips, targets, cycles, contacts=contacts, strikes=strikes)
     for t, label in enumerate(targets.label):
         clip = clips.names[clips.clip_of_frame[targets.start[t]]]
         if clip in ("jab_left", "jab_right", "straight_right"):

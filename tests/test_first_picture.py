@@ -19,7 +19,7 @@ import pytest
 
 from kumite.clip import forward_kinematics, tip_positions
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.scene import LiveScene, load_scene, measure
 from kumite.studio import Coming, Interlude, Studio
 from kumite.studio.bodies import pose_uncompiled
@@ -71,7 +71,7 @@ def preparing(stage: LiveScene, go: threading.Event) -> Iterator[tuple[Studio, C
         yield studio, coming
 
 
-def test_the_live_scene_follows_in_the_same_page(library: Library):
+def test_the_live_scene_follows_in_the_same_page(library: Layer):
     stage, go = LiveScene(load_scene("target"), library, seed=3), threading.Event()
     with preparing(stage, go) as (studio, _), join(studio) as page:
         say(page, CAMERA)
@@ -89,7 +89,7 @@ def test_the_live_scene_follows_in_the_same_page(library: Library):
         plays_and_is_steered(studio)
 
 
-def test_time_counts_from_the_live_scene_on(library: Library):
+def test_time_counts_from_the_live_scene_on(library: Layer):
     stage, go = LiveScene(load_scene("target"), library, seed=3), threading.Event()
     coming = Coming(stage.title, lambda coming: (go.wait(60), stage)[1])
     studio = Studio(Interlude(), port=0, coming=coming)

@@ -17,7 +17,7 @@ from kumite import mocap as mocap_files
 from kumite.control.game_tree import SEARCH, GameTree, Player, halts
 from kumite.control.styles import STYLES, Style
 from kumite.errors import KumiteError
-from kumite.graph import ActionTable, Library, build_action_library
+from kumite.graph import ActionTable, Layer, build_actions
 from kumite.kernels import moves as kernels
 from kumite.kernels.game import expand, flaws_of, leaves
 from kumite.kernels.moves import ATTACK, DEFENCE, NOTHING
@@ -557,13 +557,13 @@ def bounds_change_nothing(tree: GameTree, depths: list[int]) -> None:
 
 
 @pytest.fixture(scope="module")
-def performer_tree(fighters: Library) -> GameTree:
+def performer_tree(fighters: Layer) -> GameTree:
     return GameTree(fighters)
 
 
 @pytest.fixture(scope="module")
 def boxer_tree(mocap: Path) -> GameTree:
-    return GameTree(build_action_library(mocap_files.load(mocap / "boxer").clip_set()))
+    return GameTree(build_actions(mocap_files.load(mocap / "boxer").clip_set()))
 
 
 def test_bounds_do_not_change_the_answer(performer_tree: GameTree):

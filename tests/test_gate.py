@@ -15,7 +15,7 @@ import viser
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.scene import LiveScene, load_scene
 from kumite.studio import Interlude, Studio
 from kumite.studio.gate import MOST_LINES, MOST_PAGES, Gate, Names, place_of
@@ -270,7 +270,7 @@ def test_strangers_write_few_lines(caplog: pytest.LogCaptureFixture, capfd):
     assert len(said.out) + len(said.err) < 10_000 and "Traceback" not in said.err
 
 
-def test_the_doors_take_nothing_that_is_not_finite(library: Library):
+def test_the_doors_take_nothing_that_is_not_finite(library: Layer):
     """Our own calls check, too: a script may reach them without any page."""
     stage = LiveScene(load_scene("target"), library, seed=0)
     studio = Studio(stage, port=0)

@@ -14,18 +14,19 @@ from kumite.annotate import Contacts, find_contacts, find_strikes
 from kumite.clip import Clip, concatenate
 from kumite.errors import KumiteError
 from kumite.graph import (
-    Library,
+    Layer,
     Transitions,
-    build_library,
+    build_frames,
     find_transitions,
     fold,
     load_library,
     save_library,
 )
 from kumite.graph import strongest_component as component
-from kumite.graph.library import VERSION
+from kumite.graph.library_file import VERSION
 from kumite.rotation import planar_apply, planar_compose, planar_inverse
 from tests import reference, toys
+from tests.shared import only
 
 
 def transitions(pairs: list[tuple[int, int]]) -> Transitions:
@@ -81,12 +82,12 @@ def test_components_equal_the_twin(seed, lengths):
 
 def test_too_short_clips_are_refused():
     with pytest.raises(KumiteError, match="too few frames for a graph"):
-        build_library(toys.clip_set([3]))
+        build_frames(toys.clip_set([3]))
     with pytest.raises(KumiteError, match="too few frames for a graph"):
-        build_library(toys.clip_set([3]), event="none")
+        build_frames(toys.clip_set([3]), event="none")
 
 
-def test_no_dead_ends_and_every_action_plays_captured_frames(library: Library):
+def test_no_dead_ends_and_every_action_plays_captured_frames(library: Layer):
     table, clips = library.table, library.clips
     assert np.all(np.diff(table.action_start) >= 1)
     assert np.all(table.duration >= 1)
@@ -105,7 +106,7 @@ def test_no_dead_ends_and_every_action_plays_captured_frames(library: Library):
         assert reference.reachable(edges, s) == everything
 
 
-def test_displacements_carry_the_facing_frame(library: Library):
+def test_displacements_carry_the_facing_frame(library: Layer):
     table, facing = library.table, library.clips.facing
     for k in range(0, len(table.first), 7):
         before, after = facing[table.first[k] - 1], facing[table.last[k]]
@@ -116,10 +117,10 @@ def test_displacements_carry_the_facing_frame(library: Library):
         assert np.allclose(planar_apply(after, there), world, atol=1e-9)
 
 
-def test_library_file_round_trips(library: Library, tmp_path):
+def test_library_file_round_trips(library: Layer, tmp_path):
     path = tmp_path / "a.kumite"
     save_library(path, library)
-    back = load_library(path)
+    back = only(load_library(path))
     assert back.digest == library.digest and back.report == library.report
     assert back.clips.names == library.clips.names
     assert back.clips.skeleton.same_as(library.clips.skeleton)
@@ -127,7 +128,7 @@ def test_library_file_round_trips(library: Library, tmp_path):
     assert path.read_bytes() == (tmp_path / "b.kumite").read_bytes()
 
 
-def test_a_library_with_shapes_that_do_not_fit_is_damaged(library: Library, tmp_path):
+def test_a_library_with_shapes_that_do_not_fit_is_damaged(library: Layer, tmp_path):
     path = tmp_path / "bad.kumite"
     clips = replace(
         library.clips, clip_start=np.array([0, 5, len(library.clips)]), names=("a", "b")
@@ -152,11 +153,12 @@ def test_a_library_with_shapes_that_do_not_fit_is_damaged(library: Library, tmp_
     ],
 )
 def test_a_library_whose_numbers_point_nowhere_is_damaged(
-    library: Library, tmp_path, name, value, message
+    library: Layer, tmp_path, name, value, message
 ):
     """Kernels follow them without looking: unchecked, they end the process."""
     save_library(tmp_path / "a.kumite", library)
     header, arrays = files.load(tmp_path / "a.kumite", "library", VERSION)
+    name = f"frames/{name}"
     wrong = arrays[name].copy()
     wrong[len(wrong) // 2] = value
     files.save(tmp_path / "b.kumite", "library", VERSION, header, {**arrays, name: wrong})
@@ -164,14 +166,14 @@ def test_a_library_whose_numbers_point_nowhere_is_damaged(
         load_library(tmp_path / "b.kumite")
 
 
-def test_notes_that_do_not_fit_the_clips_are_refused(library: Library):
+def test_notes_that_do_not_fit_the_clips_are_refused(library: Layer):
     fewer = Contacts(library.contacts.on_ground[1:], library.contacts.resting_height)
     with pytest.raises(KumiteError, match=r"contacts of \d+ frames, clips of"):
         replace(library, contacts=fewer)
 
 
-def test_building_twice_gives_the_same_library(library: Library):
-    again = build_library(library.clips)
+def test_building_twice_gives_the_same_library(library: Layer):
+    again = build_frames(library.clips)
     assert again.digest == library.digest
 
 
@@ -185,7 +187,7 @@ def test_notes_of_one_clip_do_not_leak_into_the_next():
 
 @pytest.mark.parametrize("event", ["left", "both"])
 def test_a_graph_of_many_frames_is_made_by_the_same_rules(
-    library: Library, monkeypatch: pytest.MonkeyPatch, event: str
+    library: Layer, monkeypatch: pytest.MonkeyPatch, event: str
 ):
     """Of many lift-offs only the nearest pairs are kept in memory: shares are of all pairs."""
     takes = list(library.clips)
@@ -209,7 +211,7 @@ def test_a_graph_of_many_frames_is_made_by_the_same_rules(
 
 
 @pytest.mark.slow
-def test_the_real_boxer_gives_a_graph_of_the_papers_size(boxer: Library):
+def test_the_real_boxer_gives_a_graph_of_the_papers_size(boxer: Layer):
     r = boxer.report
     assert r["frames"] == 14445
     assert 12_000 <= r["frames_kept"] <= 14_000  # the paper, at half the rate: 6,453

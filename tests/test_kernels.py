@@ -134,9 +134,9 @@ def test_a_function_compiled_both_ways_is_kept_as_both(tmp_path: Path):
 def test_crowds_are_shown_by_what_is_compiled_first(tmp_path: Path):
     """A crowd before anybody alone: loops on all cores are compiled from nothing."""
     script = (
-        "from kumite.graph import builtin_library; from kumite.kernels import character\n"
+        "from kumite.graph import builtin_layer; from kumite.kernels import character\n"
         "from kumite.synthesis import Cast\n"
-        "cast = Cast(builtin_library(None), character.MANY)\n"
+        "cast = Cast(builtin_layer(None), character.MANY)\n"
         "cast.show(0.0); print(character.show_many.signatures != [])"
     )
     environment = {

@@ -30,7 +30,7 @@ from kumite.control import (
 )
 from kumite.control.policy import frame_discount, stretch_rewards
 from kumite.errors import KumiteError
-from kumite.graph import ActionTable, Library
+from kumite.graph import ActionTable, Layer
 from kumite.kernels import look_ahead as look
 from kumite.kernels import policy as kernels
 from kumite.rotation import planar_compose, planar_inverse
@@ -77,7 +77,7 @@ def test_the_discount_means_the_same_at_any_rate():
     assert frame_discount(behaviour, 60.0) ** 4 == pytest.approx(0.97)
 
 
-def test_sweeps_equal_the_twin(library: Library):
+def test_sweeps_equal_the_twin(library: Layer):
     """A few states of the performer's graph, both behaviours, point by point, action by action."""
     small = _few_states(library)
     behaviours = (
@@ -94,7 +94,7 @@ def test_sweeps_equal_the_twin(library: Library):
         assert np.allclose(solved.value, expected, rtol=1e-4, atol=1e-5)
 
 
-def _few_states(library: Library, count: int = 6) -> Library:
+def _few_states(library: Layer, count: int = 6) -> Layer:
     """The first stretches of a library as a table of its own, each state with all of them."""
     t = library.table
     hits = np.asarray(library.strikes.effective.any(axis=1))
@@ -117,7 +117,7 @@ def _few_states(library: Library, count: int = 6) -> Library:
     return replace(library, table=table)
 
 
-def test_values_satisfy_equation_4_within_the_residual(library: Library):
+def test_values_satisfy_equation_4_within_the_residual(library: Layer):
     for behaviour in (approach(), strike(library)):
         solved = solve(library, behaviour, residual=1e-5)
         once_more = solve(library, behaviour, residual=0.0, most_sweeps=solved.sweeps + 1)
@@ -212,7 +212,7 @@ def test_the_approach_reward_stops_early_only_when_nothing_better_can_come(seed)
     assert kernels.approach_reward(track, 0.95, 0.3, x, z) == pytest.approx(max(all_frames))
 
 
-def test_tracks_are_seen_from_where_an_action_begins(library: Library):
+def test_tracks_are_seen_from_where_an_action_begins(library: Layer):
     tracks, table = stretch_tracks(library), library.table
     assert len(tracks.centre) == len(tracks.root) == table.duration.sum()
     ends = tracks.root[tracks.centre_start[1:] - 1]
@@ -223,7 +223,7 @@ def test_tracks_are_seen_from_where_an_action_begins(library: Library):
     assert when.min() >= 1 and when.max() <= table.duration[k]
 
 
-def test_look_ahead_agrees_with_the_table_for_a_standing_target(library: Library):
+def test_look_ahead_agrees_with_the_table_for_a_standing_target(library: Layer):
     """The best action's worth at a grid point is its V: one more backup changes nothing."""
     near, hit = (solve(library, b, residual=1e-6) for b in (approach(), strike(library)))
     skill = Skill(library, near, hit, stretch_tracks(library))
@@ -243,7 +243,7 @@ def test_look_ahead_agrees_with_the_table_for_a_standing_target(library: Library
                     assert worth == pytest.approx(policy.value[state, m], rel=2e-3)
 
 
-def test_fighters_keep_their_space_and_do_not_repeat_themselves(library: Library):
+def test_fighters_keep_their_space_and_do_not_repeat_themselves(library: Layer):
     skill = Skill(
         library,
         solve(library, approach()),
@@ -270,7 +270,7 @@ def test_fighters_keep_their_space_and_do_not_repeat_themselves(library: Library
         assert gap >= 0.6 or shy.choices.apart[0] == 0
 
 
-def test_policies_are_found_again_by_content(library: Library, tmp_path):
+def test_policies_are_found_again_by_content(library: Layer, tmp_path):
     first = trained(library, approach(), tmp_path)
     again = trained(library, approach(), tmp_path, progress=lambda *_: pytest.fail("trained twice"))
     assert np.array_equal(first.value, again.value) and again.sweeps == first.sweeps
@@ -282,7 +282,7 @@ def test_policies_are_found_again_by_content(library: Library, tmp_path):
     assert np.array_equal(trained(library, approach(), tmp_path).value, first.value)
 
 
-def test_a_cache_that_cannot_be_written_is_no_error(library: Library, tmp_path):
+def test_a_cache_that_cannot_be_written_is_no_error(library: Layer, tmp_path):
     (tmp_path / "file").write_text("")
     assert trained(library, approach(), tmp_path / "file" / "cache").converged
 
@@ -339,7 +339,7 @@ def _station_twin(behaviour, tracks, k: int, target: np.ndarray, fps: float) -> 
         Station(distance=1.1, sigma=0.3, bearing=0.0, orbit=-0.6, always=True),
     ],
 )
-def test_station_rewards_equal_a_slow_twin(library: Library, station: Station):
+def test_station_rewards_equal_a_slow_twin(library: Layer, station: Station):
     behaviour = Behaviour("mine", approach_grid(), station=station)
     tracks, fps = stretch_tracks(library), library.clips.fps
     reward = stretch_rewards(behaviour, tracks, fps)
@@ -350,7 +350,7 @@ def test_station_rewards_equal_a_slow_twin(library: Library, station: Station):
         assert reward[k, m] == pytest.approx(slow, abs=1e-6)
 
 
-def test_keeping_off_backs_away_and_circling_goes_round(library: Library):
+def test_keeping_off_backs_away_and_circling_goes_round(library: Layer):
     for name, behaviour in (("keep_off", keep_off(1.8)), ("circle", circle())):
         policy = solve(library, behaviour)
         skill = Skill(
@@ -384,7 +384,7 @@ def test_keeping_off_backs_away_and_circling_goes_round(library: Library):
             assert turned > 0.3
 
 
-def test_a_place_is_reached_and_its_way_faced(library: Library):
+def test_a_place_is_reached_and_its_way_faced(library: Layer):
     """Greedy steps of take_place bring the avatar near the place, and round to its heading."""
     place = take_place()
     skill = Skill(
@@ -419,7 +419,7 @@ def test_headings_need_a_grid_of_headings():
         Behaviour("mine", heading_grid(), station=Station())
 
 
-def test_a_behaviour_counts_only_in_its_active_region(library: Library):
+def test_a_behaviour_counts_only_in_its_active_region(library: Layer):
     near = replace(keep_off(), name="near", farthest=1.0)
     skill = Skill(
         library,
@@ -436,7 +436,7 @@ def test_a_behaviour_counts_only_in_its_active_region(library: Library):
     assert mind.choices.worth[0] == 0
 
 
-def test_striking_counts_only_while_the_target_is_in_reach(library: Library):
+def test_striking_counts_only_while_the_target_is_in_reach(library: Layer):
     """What is said of its reach is what is so: at its rim and beyond, striking is worth nothing."""
     behaviour = strike(library)
     assert 1.2 < behaviour.farthest < 2.0

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from kumite.annotate import find_contacts, find_cycles, find_reference, find_strikes
 from kumite.clip import SIDES, ClipSet, concatenate, facing_frame, forward_kinematics
 from kumite.errors import KumiteError
-from kumite.graph import Library, authored_targets, build_hierarchy, hierarchy_table
+from kumite.graph import Layer, authored_targets, build_hierarchy, hierarchy_table
 from kumite.kernels import preparation as kernels
 from kumite.performer import perform
 from kumite.rotation import angle, planar_compose, planar_inverse, rotate
@@ -426,7 +426,7 @@ def test_who_plays_the_graph_prepares_without_jumps(walker: Walker):
     made = perform("targets", mirrored=False)
     targets = authored_targets(clips, made.truth, 60.0)
     table, _ = hierarchy_table(clips, build_hierarchy(clips, walker.cycles, targets))
-    cast = Cast(Library(clips, contacts, find_strikes(clips), table), 1)
+    cast = Cast(Layer(clips, contacts, find_strikes(clips), table), 1)
     cast.place(0, 0, np.zeros(3))
     work = Preparation(clips.skeleton, 60.0, walker.postures, 1)
     smooth, rng, before = LevelFilter(1, 60.0), np.random.default_rng(0), None

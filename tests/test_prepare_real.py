@@ -9,7 +9,7 @@ import pytest
 
 from kumite import mocap as mocap_files
 from kumite.annotate import find_contacts, find_strikes
-from kumite.graph import Library, build_preparation_library, find_targets
+from kumite.graph import Layer, build_preparation, find_targets
 from kumite.graph.preparing import KINDS
 from kumite.scene import PrepareScene
 from kumite.scene.settings import SceneSettings
@@ -25,15 +25,15 @@ TAKES = (
 
 
 @pytest.fixture(scope="module")
-def woody(mocap: Path) -> Library:
+def woody(mocap: Path) -> Layer:
     clips = mocap_files.load([mocap / "woody" / f"{name}.amc" for name in TAKES]).clip_set()
     contacts, strikes = find_contacts(clips), find_strikes(clips)
     targets, cycles = find_targets(clips, contacts, strikes)
-    return build_preparation_library(clips, targets, cycles, contacts=contacts, strikes=strikes)
+    return build_preparation(clips, targets, cycles, contacts=contacts, strikes=strikes)
 
 
 @pytest.mark.slow
-def test_real_clips_pass_under_and_over(woody: Library, tmp_path: Path):
+def test_real_clips_pass_under_and_over(woody: Layer, tmp_path: Path):
     preparing = woody.preparing
     assert preparing is not None
     labels = preparing.hierarchy.targets.label

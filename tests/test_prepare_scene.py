@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from kumite.errors import KumiteError
-from kumite.graph import Library, save_library
+from kumite.graph import Layer, save_library
 from kumite.rotation import angle
 from kumite.scene import PrepareScene, load_scene, record, with_count
 from kumite.scene.settings import SceneSettings
@@ -25,7 +25,7 @@ TARGETS = [
 
 
 @pytest.fixture(scope="module")
-def targets() -> Library:
+def targets() -> Layer:
     return builtin("targets", "preparation")
 
 
@@ -35,7 +35,7 @@ def learned(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def built(targets: Library, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def built(targets: Layer, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A library file, in a folder of its own."""
     path = tmp_path_factory.mktemp("built") / "targets.kumite"
     save_library(path, targets)
@@ -47,7 +47,7 @@ def settings(**given) -> SceneSettings:
     return SceneSettings.model_validate({**new, "target": TARGETS, **given})
 
 
-def scene_of(library: Library, learned: Path, seed: int = 0, **given) -> PrepareScene:
+def scene_of(library: Layer, learned: Path, seed: int = 0, **given) -> PrepareScene:
     return PrepareScene(settings(**given), library, seed=seed, cache=learned)
 
 
@@ -55,7 +55,7 @@ def scene_of(library: Library, learned: Path, seed: int = 0, **given) -> Prepare
 
 
 @pytest.mark.parametrize("preparation", ["ours", "linear", "none"])
-def test_things_are_done_without_jumps(targets: Library, learned: Path, preparation: str):
+def test_things_are_done_without_jumps(targets: Layer, learned: Path, preparation: str):
     scene = scene_of(targets, learned, prepare={"preparation": preparation})
     w, fps = scene.walkers, scene.fps
     before = w.shown.position.copy(), w.shown.wxyz.copy(), 0.0, True
@@ -86,7 +86,7 @@ def test_things_are_done_without_jumps(targets: Library, learned: Path, preparat
         assert max(at) < 12.0, event
 
 
-def test_who_prepares_begins_nearer_to_the_posture(targets: Library, learned: Path):
+def test_who_prepares_begins_nearer_to_the_posture(targets: Layer, learned: Path):
     apart = {}
     for preparation in ("ours", "none"):
         scene = scene_of(targets, learned, prepare={"preparation": preparation})
@@ -97,7 +97,7 @@ def test_who_prepares_begins_nearer_to_the_posture(targets: Library, learned: Pa
     assert apart["ours"] < 0.4 * apart["none"]
 
 
-def _between_beams(targets: Library, learned: Path, apart: float) -> tuple[float, float]:
+def _between_beams(targets: Layer, learned: Path, apart: float) -> tuple[float, float]:
     """Mean level and least height of the pelvis between two crawls, the beams so far apart [m]."""
     beams = [
         {"name": f"beam {n}", "motion": "crawl_under", "position": (0.0, 3.0 + n * apart)}
@@ -120,7 +120,7 @@ def _between_beams(targets: Library, learned: Path, apart: float) -> tuple[float
     return float(np.mean(levels)), float(np.max(heights))
 
 
-def test_between_close_beams_the_style_is_kept_up(targets: Library, learned: Path):
+def test_between_close_beams_the_style_is_kept_up(targets: Layer, learned: Path):
     """Section 7: two obstacles in sequence. Far apart one stands up in between."""
     near, far = (_between_beams(targets, learned, apart) for apart in (2.2, 6.0))
     assert near[0] > far[0] + 0.2
@@ -129,7 +129,7 @@ def test_between_close_beams_the_style_is_kept_up(targets: Library, learned: Pat
 
 @pytest.mark.parametrize("preparation", ["ours", "none"])
 def test_who_has_passed_an_obstacle_turns_round_and_comes_back(
-    targets: Library, learned: Path, preparation: str
+    targets: Layer, learned: Path, preparation: str
 ):
     """Three alone with an obstacle each: nobody lingers before it, nobody touches it."""
     motions = ("duck_under", "crawl_under", "jump_over")
@@ -155,7 +155,7 @@ def test_who_has_passed_an_obstacle_turns_round_and_comes_back(
 # What is told by hand ----------------------------------------------------------------------------
 
 
-def test_led_by_hand(targets: Library, learned: Path):
+def test_led_by_hand(targets: Layer, learned: Path):
     scene = scene_of(targets, learned, prepare={"automatic": False})
     np.testing.assert_array_equal(scene.go(0, np.array([1.0, 1.0])), [1.0, 1.0])
     assert not scene.events
@@ -179,7 +179,7 @@ def test_led_by_hand(targets: Library, learned: Path):
 
 @pytest.mark.parametrize("made_for", [0, 1])
 def test_what_somebody_makes_for_is_told_by_its_heading(
-    targets: Library, learned: Path, made_for: int
+    targets: Layer, learned: Path, made_for: int
 ):
     aside = [
         {"name": "ball", "motion": "kick_ball", "position": (1.5, 3.0)},
@@ -219,7 +219,7 @@ def test_what_somebody_makes_for_is_told_by_its_heading(
 
 
 @pytest.mark.parametrize("name", ["ball-kick", "brawl", "drill"])
-def test_same_seed_same_frames(targets: Library, learned: Path, name: str):
+def test_same_seed_same_frames(targets: Layer, learned: Path, name: str):
     scene = PrepareScene(load_scene(name), targets, seed=3, cache=learned)
     first = record(scene, 6.0)
     scene.reset(3)
@@ -245,7 +245,7 @@ def test_threads_do_not_change_a_drill(built: Path, tmp_path: Path):
     assert written[0] == written[1]
 
 
-def test_a_walker_is_the_same_among_many(targets: Library, learned: Path):
+def test_a_walker_is_the_same_among_many(targets: Layer, learned: Path):
     """Arrays over all against one alone: the first of a drill, far from the others."""
     alone = PrepareScene(with_count(load_scene("drill"), 1), targets, cache=learned)
     many = PrepareScene(with_count(load_scene("drill"), 5), targets, cache=learned)
@@ -308,7 +308,7 @@ def test_scenes_that_cannot_be(run, built: Path, tmp_path: Path, parts: dict, sa
     assert "Traceback" not in error and not (tmp_path / "s.rec").exists()
 
 
-def test_another_kind_of_library_is_refused(library: Library):
+def test_another_kind_of_library_is_refused(library: Layer):
     with pytest.raises(KumiteError, match="about preparation; expected a library built with"):
         PrepareScene(load_scene("ball-kick"), library)
 
@@ -338,7 +338,7 @@ def test_scenes_leave_as_files(run, built: Path, tmp_path: Path, name: str):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["ball-kick", "obstacle-course"])
-def test_scenes_are_done(targets: Library, learned: Path, name: str):
+def test_scenes_are_done(targets: Layer, learned: Path, name: str):
     scene = PrepareScene(load_scene(name), targets, seed=201, cache=learned)
     for _ in range(round(60 * scene.fps)):
         scene.step()

@@ -14,19 +14,19 @@ from kumite.body import Body, lay_body
 from kumite.clip import LIMBS, ClipSet, concatenate, tip_positions
 from kumite.errors import KumiteError
 from kumite.graph import (
-    Library,
+    Layer,
     Targets,
     authored_targets,
-    build_preparation_library,
+    build_preparation,
     load_library,
     save_library,
 )
-from kumite.graph.library import VERSION
+from kumite.graph.library_file import VERSION
 from kumite.graph.preparing import KINDS, MARGIN, PLACE, Preparing, find_about
 from kumite.kernels import passing
 from kumite.performer import perform
 from kumite.rotation import planar_apply, planar_inverse, rotate
-from tests.shared import builtin
+from tests.shared import builtin, only
 
 ABOUT = {
     "duck_under": "under",
@@ -38,18 +38,18 @@ ABOUT = {
 }
 
 
-def prepared(library: Library) -> Preparing:
+def prepared(library: Layer) -> Preparing:
     assert library.preparing is not None
     return library.preparing
 
 
 @pytest.fixture(scope="module")
-def library() -> Library:
+def library() -> Layer:
     return builtin("targets", "preparation")
 
 
 @pytest.fixture(scope="module")
-def preparing(library: Library) -> Preparing:
+def preparing(library: Layer) -> Preparing:
     return prepared(library)
 
 
@@ -197,7 +197,7 @@ def test_who_ducks_on_the_spot_passes_nothing(library):
 
 def test_a_library_is_read_as_it_was_written(library, tmp_path: Path):
     save_library(tmp_path / "a.kumite", library)
-    again = load_library(tmp_path / "a.kumite")
+    again = only(load_library(tmp_path / "a.kumite"))
     assert again.digest == library.digest and again.report == library.report
     for f in fields(Preparing):
         ours, theirs = getattr(prepared(library), f.name), getattr(prepared(again), f.name)
@@ -230,6 +230,7 @@ def test_a_library_is_read_as_it_was_written(library, tmp_path: Path):
 def test_damaged_libraries(library, tmp_path: Path, name: str, wrong: float):
     save_library(tmp_path / "a.kumite", library)
     header, arrays = files.load(tmp_path / "a.kumite", "library", VERSION)
+    name = f"preparation/{name}"
     changed = arrays[name].copy()
     changed.flat[-1] = wrong
     files.save(tmp_path / "b.kumite", "library", VERSION, header, {**arrays, name: changed})
@@ -248,16 +249,16 @@ def test_damaged_libraries(library, tmp_path: Path, name: str, wrong: float):
 def test_libraries_that_cannot_be_built(library):
     clips, targets = library.clips, prepared(library).hierarchy.targets
     with pytest.raises(KumiteError, match="no target motion; expected at least one"):
-        build_preparation_library(clips, Targets((), *[np.zeros(0)] * 3))
+        build_preparation(clips, Targets((), *[np.zeros(0)] * 3))
     for alike, text in ((0.0, "alike 0.0 rad"), (np.nan, "alike nan rad")):
         with pytest.raises(KumiteError, match=text):
-            build_preparation_library(clips, targets, alike=alike)
+            build_preparation(clips, targets, alike=alike)
     with pytest.raises(KumiteError, match=r"threshold -1\.0 rad²"):
-        build_preparation_library(clips, targets, threshold=-1.0)
+        build_preparation(clips, targets, threshold=-1.0)
     end = int(clips.clip_start[1])
     across = Targets(("x",), np.array([end - 50]), np.array([end + 50]), np.array([end]))
     with pytest.raises(KumiteError, match=r"target 'x': frames .* no part of one clip"):
-        build_preparation_library(clips, across)
+        build_preparation(clips, across)
     with pytest.raises(KumiteError, match="no target motion: none of these clips marks"):
         builtin("locomotion", "preparation")
 
@@ -268,7 +269,7 @@ def test_a_target_that_falls_back_is_told(library):
     air = int(prepared(library).contact[t])  # nothing supports who is in the air
     jump = Targets(("jump",), np.array([air - 1]), targets.stop[[t]], np.array([air]))
     cores = prepared(library).hierarchy.cores
-    built = build_preparation_library(clips, jump, cores, threshold=1e-9)
+    built = build_preparation(clips, jump, cores, threshold=1e-9)
     assert built.report["fall_back"] == ["jump"] and not prepared(built).found[0]
     assert prepared(built).reference[0] == air - 1
 
@@ -281,7 +282,7 @@ def test_cores_may_be_given_or_found(library):
     mine = hand_cycles(
         clips, contacts, [("my walk", int(found.start[walk]), int(found.stop[walk]))]
     )
-    built = build_preparation_library(clips, targets, mine)
+    built = build_preparation(clips, targets, mine)
     assert built.report["cores"] == ["my walk"]
     assert len(find_strikes(clips)) == built.report["hits"]
 
@@ -289,7 +290,7 @@ def test_cores_may_be_given_or_found(library):
 def test_authored_targets_at_another_rate():
     made = perform("targets", mirrored=False)
     clips = concatenate(list(made.clips), 30.0)
-    built = build_preparation_library(clips, authored_targets(clips, made.truth, 60.0))
+    built = build_preparation(clips, authored_targets(clips, made.truth, 60.0))
     told = {
         label: KINDS[k]
         for label, k in zip(prepared(built).hierarchy.targets.label, prepared(built).kind)

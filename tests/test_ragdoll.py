@@ -13,7 +13,7 @@ from kumite.body import Body, keep_out, lay_body
 from kumite.body.apart import DIRECTIONS, NEAR, NO_PART, posed
 from kumite.clip import ClipSet, Skeleton, concatenate, facing_frame, forward_kinematics
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.kernels import character as kernels
 from kumite.kernels import overlap
 from kumite.synthesis import Cast, Moment, Ragdoll, Responses, blow_impulse, find_responses
@@ -60,7 +60,7 @@ def standing(clips: ClipSet, count: int) -> list[int]:
 
 
 @pytest.fixture(scope="module")
-def clips(library: Library) -> ClipSet:
+def clips(library: Layer) -> ClipSet:
     return library.clips
 
 
@@ -113,7 +113,7 @@ def test_without_a_blow_the_body_goes_on(ragdoll: Ragdoll, clips: ClipSet, stood
     assert max(p.slip for p in found) < 0.002
 
 
-def test_a_real_boxer_goes_on_and_is_moved(physics, boxer: Library):
+def test_a_real_boxer_goes_on_and_is_moved(physics, boxer: Layer):
     clips = boxer.clips
     ragdoll = Ragdoll(clips.skeleton, lay_body(clips.skeleton), clips.fps)
     head = clips.skeleton.joint("head")
@@ -363,7 +363,7 @@ def test_the_rate_of_a_rotation_vector(seed):
     assert np.allclose(rate, slope, atol=1e-4)
 
 
-def test_a_character_goes_on_from_its_own_pose(library: Library):
+def test_a_character_goes_on_from_its_own_pose(library: Layer):
     """Place and velocity of everything are the given ones, and the capture's after a while."""
     clips, s = library.clips, library.clips.skeleton
     fps, rng = clips.fps, np.random.default_rng(5)
@@ -410,7 +410,7 @@ def test_a_character_goes_on_from_its_own_pose(library: Library):
         assert velocity.shape == position.shape
 
 
-def test_poses_and_speeds_do_not_jump_where_a_character_goes_on(library: Library):
+def test_poses_and_speeds_do_not_jump_where_a_character_goes_on(library: Layer):
     """Frame by frame: a cast plays, its own pose is handed back to it elsewhere in a clip."""
     clips = library.clips
     cast = Cast(library, 1)
@@ -434,7 +434,7 @@ def test_poses_and_speeds_do_not_jump_where_a_character_goes_on(library: Library
     assert np.linalg.norm(speed, axis=-1).max() / clips.fps < 0.15
 
 
-def test_going_on_refuses_what_it_cannot_play(library: Library):
+def test_going_on_refuses_what_it_cannot_play(library: Layer):
     cast, clips = Cast(library, 1), library.clips
     now = Moment.between(clips.root_position[:2], clips.wxyz[:2], clips.fps)
     second = int(clips.clip_start[1])

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from kumite import rotation
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.kernels import character as kernels
 from kumite.kernels import phase as phases
 from kumite.scene import LiveScene, live, load_recording, load_scene, measure, record, with_count
@@ -128,7 +128,7 @@ def test_what_is_shown_goes_on_through_a_join_at_any_rate(seed, pace, rate):
     assert np.allclose(stood[:2], rotation.planar_compose(anchor, facing[10])[:2])
 
 
-def _walk(library: Library, rate, frames: int, seed: int):
+def _walk(library: Layer, rate, frames: int, seed: int):
     """A cast of one that takes random actions; rate(i) at each shown frame."""
     cast, rng = Cast(library, 1), np.random.default_rng(seed)
     table = library.table
@@ -159,7 +159,7 @@ def _walk(library: Library, rate, frames: int, seed: int):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_time_is_exact_over_any_chain_of_actions(library: Library, seed: int):
+def test_time_is_exact_over_any_chain_of_actions(library: Layer, seed: int):
     rng = np.random.default_rng(seed)
     drawn = np.exp(rng.uniform(np.log(SLOWEST), np.log(FASTEST), 1500))
     *_, joined, off = _walk(library, lambda i: drawn[i], len(drawn), seed)
@@ -167,7 +167,7 @@ def test_time_is_exact_over_any_chain_of_actions(library: Library, seed: int):
     assert abs(off) < 1e-6
 
 
-def test_between_frames_a_pose_lies_between_theirs(library: Library):
+def test_between_frames_a_pose_lies_between_theirs(library: Layer):
     """At half speed along captured frames: every other pose is one, the rest are between."""
     cast, clips = Cast(library, 1), library.clips
     table = library.table
@@ -195,7 +195,7 @@ def test_between_frames_a_pose_lies_between_theirs(library: Library):
 
 
 @pytest.mark.parametrize("rate", [0.5, 2.0])
-def test_joins_do_not_jump_and_feet_hold_at_any_rate(library: Library, rate: float):
+def test_joins_do_not_jump_and_feet_hold_at_any_rate(library: Layer, rate: float):
     """As much as at the captured speed: a foot of the capture moves ``rate`` times as fast, and
     from one shown frame to the next speeds change by the square of it."""
     fps, skeleton = library.clips.fps, library.clips.skeleton
@@ -212,14 +212,14 @@ def test_joins_do_not_jump_and_feet_hold_at_any_rate(library: Library, rate: flo
 
 @pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.5, 2.0])
-def test_the_real_boxers_feet_hold_at_any_rate(boxer: Library, rate: float):
+def test_the_real_boxers_feet_hold_at_any_rate(boxer: Layer, rate: float):
     position, contacts, joined, _ = _walk(boxer, lambda i: rate, int(3600 / rate), 1)
     assert joined.sum() > 10
     skate = foot_skate(boxer.clips.skeleton, position, contacts, boxer.clips.fps)
     assert skate < 1.5 * rate * source_skate(boxer)
 
 
-def test_speed_is_continuous_while_the_rate_changes_smoothly(library: Library):
+def test_speed_is_continuous_while_the_rate_changes_smoothly(library: Layer):
     """Along one action: what the pose moves by is the rate times the capture's own speed."""
     table, fps = library.table, library.clips.fps
     k = int(np.argmax(table.last - table.first))
@@ -244,7 +244,7 @@ def test_speed_is_continuous_while_the_rate_changes_smoothly(library: Library):
     assert steps.max() <= np.abs(np.diff(asked)).max() * own.max() + 1.6 * 1.6 * bend + 1e-9
 
 
-def test_who_stays_at_an_end_comes_to_it_and_stays(library: Library):
+def test_who_stays_at_an_end_comes_to_it_and_stays(library: Layer):
     cast = Cast(library, 1)
     cast.place(0, 2, np.zeros(3))
     first = library.table.stretch[library.table.actions_of(2)][0]
@@ -260,7 +260,7 @@ def test_who_stays_at_an_end_comes_to_it_and_stays(library: Library):
         assert len(cast.waiting) == 1
 
 
-def test_what_is_foreseen_is_what_is_shown_at_any_rate(library: Library):
+def test_what_is_foreseen_is_what_is_shown_at_any_rate(library: Layer):
     cast, alone = Cast(library, 2), Cast(library, 1)
     for k in range(2):
         cast.place(k, 4, np.array([k, 0.0, 1.0]))
@@ -278,21 +278,21 @@ def test_what_is_foreseen_is_what_is_shown_at_any_rate(library: Library):
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, 0.2, 4.1, np.nan, np.inf])
-def test_rates_out_of_bounds_are_refused(library: Library, rate: float):
+def test_rates_out_of_bounds_are_refused(library: Layer, rate: float):
     cast = Cast(library, 3)
     with pytest.raises(KumiteError, match=r"cast: rate .*, expected 0.25 to 4"):
         cast.set_rate(np.array([0, 2]), np.array([1.0, rate]))
     assert np.all(cast.rate == 1.0)
 
 
-def _uneven(library: Library, count: int) -> LiveScene:
+def _uneven(library: Layer, count: int) -> LiveScene:
     scene = LiveScene(with_count(load_scene("crowd"), count), library, seed=3)
     scene.cast.set_rate(np.arange(count), np.linspace(0.5, 2.0, count))
     return scene
 
 
 def test_a_crowd_of_many_rates_is_the_same_on_all_cores(
-    library: Library, monkeypatch: pytest.MonkeyPatch
+    library: Layer, monkeypatch: pytest.MonkeyPatch
 ):
     """And each has moved on by its rate, through all the actions that it took."""
     frames, cores = [], numba.get_num_threads()
@@ -313,7 +313,7 @@ def test_a_crowd_of_many_rates_is_the_same_on_all_cores(
     assert sum(taken[10:]) > 1.3 * sum(taken[:10])
 
 
-def test_a_recording_keeps_the_rates(library: Library, tmp_path: Path):
+def test_a_recording_keeps_the_rates(library: Layer, tmp_path: Path):
     """So that a frame shown twice, or passed over, is no join."""
     fight = record(_uneven(library, 6), 5.0)
     path = tmp_path / "uneven.rec"

@@ -12,7 +12,7 @@ from kumite.body import keep_out
 from kumite.clip import SIDES, forward_kinematics
 from kumite.control.game_tree import GameTree
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.kernels.blow import NO_BLOW
 from kumite.kernels.moves import FIELDS, place_at
 from kumite.scene import BoutScene, SceneSettings, load_scene, measure, record
@@ -23,12 +23,12 @@ from tests.shared import builtin
 
 
 @pytest.fixture(scope="module")
-def actions() -> Library:
+def actions() -> Layer:
     """The built-in boxer's actions."""
     return builtin(level="actions")
 
 
-def _fight(actions: Library, reactions: str = "auto", seed: int = 1) -> BoutScene:
+def _fight(actions: Layer, reactions: str = "auto", seed: int = 1) -> BoutScene:
     settings = load_scene("boxing").model_dump(exclude_none=True)
     settings["bout"]["reactions"] = reactions
     return BoutScene(SceneSettings.model_validate(settings), actions, seed=seed)
@@ -58,7 +58,7 @@ def physics() -> None:
     pytest.importorskip("mujoco")
 
 
-def test_a_blow_moves_the_victim_from_the_next_frame_on(actions: Library, physics: None):
+def test_a_blow_moves_the_victim_from_the_next_frame_on(actions: Layer, physics: None):
     found = {}
     for mode in ("physical", "kinematic"):
         scene = _fight(actions, mode)
@@ -75,7 +75,7 @@ def test_a_blow_moves_the_victim_from_the_next_frame_on(actions: Library, physic
 
 
 def test_the_moment_is_smooth_and_the_response_follows(
-    actions: Library, physics: None, monkeypatch: pytest.MonkeyPatch
+    actions: Layer, physics: None, monkeypatch: pytest.MonkeyPatch
 ):
     scene = _fight(actions, "physical")
     table, cast, fps = actions.table, scene.cast, scene.fps
@@ -125,7 +125,7 @@ def test_the_moment_is_smooth_and_the_response_follows(
 
 
 def test_the_tree_expects_a_struck_fighter_where_it_comes_to(
-    actions: Library, physics: None, monkeypatch: pytest.MonkeyPatch
+    actions: Layer, physics: None, monkeypatch: pytest.MonkeyPatch
 ):
     """What `_choose` tells the tree of the victim is true in and after the moment, to the end."""
     scene = _fight(actions, "physical", seed=2)
@@ -155,7 +155,7 @@ def test_the_tree_expects_a_struck_fighter_where_it_comes_to(
     assert expected and np.all(scene.reactions.late == 0)
 
 
-def test_who_is_struck_again_is_pushed_from_where_it_is(actions: Library, physics: None):
+def test_who_is_struck_again_is_pushed_from_where_it_is(actions: Layer, physics: None):
     scene = _fight(actions, "physical")
     k = _until_hit(scene)
     scene.step()
@@ -172,7 +172,7 @@ def test_who_is_struck_again_is_pushed_from_where_it_is(actions: Library, physic
     assert np.abs(scene.wxyz[k] - shown).max() < 0.2
 
 
-def test_a_physical_fight_is_the_same_every_time(actions: Library, physics: None):
+def test_a_physical_fight_is_the_same_every_time(actions: Layer, physics: None):
     a, b = (record(_fight(actions, "physical"), 15.0) for _ in range(2))
     assert any(e.data.get("physical") for e in a.events)
     assert a.wxyz.tobytes() == b.wxyz.tobytes() and a.events == b.events
@@ -182,7 +182,7 @@ def test_a_physical_fight_is_the_same_every_time(actions: Library, physics: None
         assert c.skate_m_s < 0.02 and c.join_jump_m_s < 0.6
 
 
-def test_without_mujoco_fights_are_kinematic(actions: Library, monkeypatch: pytest.MonkeyPatch):
+def test_without_mujoco_fights_are_kinematic(actions: Layer, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     scene = _fight(actions)
     assert not scene.reactions.physical
@@ -193,7 +193,7 @@ def test_without_mujoco_fights_are_kinematic(actions: Library, monkeypatch: pyte
         _fight(actions, "physical")
 
 
-def test_which_fights_are_physical(actions: Library, physics: None):
+def test_which_fights_are_physical(actions: Layer, physics: None):
     tree = GameTree(actions)
     assert Reactions(tree, MOST_PHYSICAL).physical
     assert not Reactions(tree, MOST_PHYSICAL + 1).physical
@@ -217,7 +217,7 @@ def _depth(scene: BoutScene) -> float:
     return keep_out(body, *poses[0], body, *poses[1], parts=parts[0], other_parts=parts[1]).depth
 
 
-def test_two_in_each_other_leave_slowly_on_planted_feet(actions: Library):
+def test_two_in_each_other_leave_slowly_on_planted_feet(actions: Layer):
     scene = _fight(actions)
     cast = scene.cast
     cast.carry(0, cast.root_position[1, [0, 2]] - cast.root_position[0, [0, 2]] + [0.02, 0.0])
@@ -238,7 +238,7 @@ def test_two_in_each_other_leave_slowly_on_planted_feet(actions: Library):
     assert standing.max() < 0.01
 
 
-def test_what_strikes_may_touch(actions: Library):
+def test_what_strikes_may_touch(actions: Layer):
     body = _fight(actions).floor.body
     thrown = np.full(4, NO_BLOW)
     assert len(held_apart(body, thrown)) == len(body)

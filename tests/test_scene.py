@@ -13,7 +13,7 @@ from kumite import files
 from kumite.body import ARMS
 from kumite.clip import concatenate, tip_positions
 from kumite.errors import KumiteError
-from kumite.graph import Library, build_library
+from kumite.graph import Layer, build_frames
 from kumite.kernels import blow as kernels
 from kumite.kernels import crowd, near
 from kumite.performer import perform
@@ -37,7 +37,7 @@ from tests import reference, toys
 
 
 @pytest.fixture(scope="module")
-def sparring(library: Library) -> LiveScene:
+def sparring(library: Layer) -> LiveScene:
     return LiveScene(load_scene("sparring"), library, seed=1)
 
 
@@ -225,7 +225,7 @@ def test_a_scene_file_that_is_missing_or_no_text(tmp_path):
 # Sparring ----------------------------------------------------------------------------------------
 
 
-def test_a_library_whose_blows_are_out_of_reach_is_refused(library: Library):
+def test_a_library_whose_blows_are_out_of_reach_is_refused(library: Layer):
     """Blows that the graph leaves out can never be thrown."""
     played = np.zeros(len(library.clips), dtype=bool)
     for first, last in zip(library.table.first, library.table.last):
@@ -264,7 +264,7 @@ def test_a_recording_begins_where_the_scene_is(sparring: LiveScene):
             assert e.data["time"] == pytest.approx(e.frame / second.fps, abs=1.1 / second.fps)
 
 
-def test_bodies_on_one_spot_are_carried_apart_slowly(library: Library):
+def test_bodies_on_one_spot_are_carried_apart_slowly(library: Layer):
     name = "abc"
     settings = SceneSettings.model_validate(
         {
@@ -344,7 +344,7 @@ def test_a_blow_lands_or_is_blocked_never_both(fight: Recording):
         )
 
 
-def test_a_struck_body_shows_it(library: Library):
+def test_a_struck_body_shows_it(library: Layer):
     """The victim's head is displaced along the blow in the frames after a hit."""
     scene = LiveScene(load_scene("sparring"), library, seed=1)
     moved = []
@@ -364,7 +364,7 @@ def test_decisions_are_logged_with_what_was_considered(fight: Recording):
     assert all(e.data["considered"] >= 1 and e.data["apart"] >= 0 for e in decisions)
 
 
-def test_behaviours_are_named_in_scene_files_and_tuned_while_it_runs(library: Library, tmp_path):
+def test_behaviours_are_named_in_scene_files_and_tuned_while_it_runs(library: Layer, tmp_path):
     file = tmp_path / "shy.toml"
     file.write_text(
         'title = "shy"\n[[character]]\nname = "red"\nposition = [0, -0.5]\naims_at = "ball"\n'
@@ -390,7 +390,7 @@ def test_behaviours_are_named_in_scene_files_and_tuned_while_it_runs(library: Li
             control.set(0.0)
 
 
-def test_unknown_behaviours_and_weights_all_zero_are_refused(library: Library, tmp_path):
+def test_unknown_behaviours_and_weights_all_zero_are_refused(library: Layer, tmp_path):
     two = [
         {"name": n, "position": (0, z), "aims_at": o} for n, z, o in (("a", 0, "b"), ("b", 1, "a"))
     ]
@@ -411,7 +411,7 @@ def test_unknown_behaviours_and_weights_all_zero_are_refused(library: Library, t
 # The target --------------------------------------------------------------------------------------
 
 
-def test_a_boxer_goes_for_the_target_wherever_it_is_put(library: Library):
+def test_a_boxer_goes_for_the_target_wherever_it_is_put(library: Layer):
     scene = LiveScene(load_scene("target"), library, seed=0)
     for place in ([0.0, 1.5, 1.2], [-1.5, 1.45, -1.0], [2.0, 1.5, -1.0]):
         scene.move_object("target", np.array(place))
@@ -434,7 +434,7 @@ def _run(scene: LiveScene, seconds: float) -> tuple[np.ndarray, np.ndarray, int]
     return way, gap, sum(e.kind == "hit" for e in scene.events) - before
 
 
-def test_a_target_dragged_behind_is_turned_to_and_hit(library: Library):
+def test_a_target_dragged_behind_is_turned_to_and_hit(library: Layer):
     scene = LiveScene(load_scene("target"), library, seed=0)
     scene.move_object("target", np.array([0.0, 1.5, -1.5]))
     _, gap, hits = _run(scene, 20.0)
@@ -442,7 +442,7 @@ def test_a_target_dragged_behind_is_turned_to_and_hit(library: Library):
 
 
 @pytest.mark.parametrize("height", [0.0, 0.3, 2.6, 50.0])
-def test_a_target_at_a_height_of_no_blow_is_approached_and_kept_near(library: Library, height):
+def test_a_target_at_a_height_of_no_blow_is_approached_and_kept_near(library: Layer, height):
     scene = LiveScene(load_scene("target"), library, seed=1)
     scene.move_object("target", np.array([0.5, height, 1.5]))
     way, gap, hits = _run(scene, 16.0)
@@ -453,7 +453,7 @@ def test_a_target_at_a_height_of_no_blow_is_approached_and_kept_near(library: Li
     assert sum(e.kind == "decision" for e in scene.events) >= 10
 
 
-def test_a_target_out_of_every_grid_is_walked_to(library: Library):
+def test_a_target_out_of_every_grid_is_walked_to(library: Layer):
     scene = LiveScene(load_scene("target"), library, seed=0)
     place = np.array([-3.5, 1.5, -3.5])
     policies = scene.skill.policies
@@ -466,7 +466,7 @@ def test_a_target_out_of_every_grid_is_walked_to(library: Library):
     assert gap.min() < 1.0 and hits >= 1
 
 
-def test_a_struck_target_swings_and_comes_back(library: Library):
+def test_a_struck_target_swings_and_comes_back(library: Layer):
     scene = LiveScene(load_scene("target"), library, seed=0)
     home = scene.objects[0].position.copy()
     scene._swing[0] = np.array([1.0, 0.0, 0.0])
@@ -576,7 +576,7 @@ def test_join_jumps_are_changes_of_the_roots_speed():
     assert m.characters[0].join_jump_m_s == pytest.approx(2.0, rel=1e-3)
 
 
-def test_source_skate_is_the_clips_own(library: Library):
+def test_source_skate_is_the_clips_own(library: Layer):
     clips = library.clips
     position, _ = clips.world
     by_clip = [
@@ -587,7 +587,7 @@ def test_source_skate_is_the_clips_own(library: Library):
 
 
 @pytest.mark.slow
-def test_five_minutes_of_the_real_boxer(boxer: Library):
+def test_five_minutes_of_the_real_boxer(boxer: Layer):
     """The figures that a fight on real motion must reach, over several seeds."""
     scene = LiveScene(load_scene("sparring"), boxer)
     landed = {"red": 0, "blue": 0}
@@ -608,7 +608,7 @@ def test_five_minutes_of_the_real_boxer(boxer: Library):
 def test_two_of_one_clip_do_not_move_in_step():
     """What one clip offers is little, and two who see the same of each other choose alike."""
     (jab,) = [c for c in perform("boxing", 0).clips if c.name == "jab"]
-    thin = build_library(concatenate([jab]))
+    thin = build_frames(concatenate([jab]))
     for seed in range(10):
         scene = LiveScene(load_scene("sparring"), thin, seed=seed)
         apart = []
@@ -619,7 +619,7 @@ def test_two_of_one_clip_do_not_move_in_step():
         assert any(e.kind == "hit" for e in scene.events), seed
 
 
-def test_who_chooses_at_the_same_moment_does_not_choose_the_same(library: Library):
+def test_who_chooses_at_the_same_moment_does_not_choose_the_same(library: Layer):
     scene = LiveScene(load_scene("sparring"), library, seed=1)
     cast = scene.cast
     state = int(np.argmax(np.diff(library.table.action_start)))

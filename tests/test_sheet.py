@@ -24,7 +24,7 @@ from kumite.export.sheet import (
     recording_sheet,
     render,
 )
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.kernels.raster import draw_triangles
 from kumite.scene import Event, LiveScene, Recording, load_scene, record
 from tests import toys
@@ -49,7 +49,7 @@ def test_a_sheet_has_a_cell_for_every_frame(tmp_path):
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
-def test_a_recording_is_drawn(library: Library, tmp_path):
+def test_a_recording_is_drawn(library: Layer, tmp_path):
     scene = LiveScene(load_scene("target"), library)
     recording_sheet(tmp_path / "r.png", record(scene, 1.0), size=(120, 100))
     assert Image.open(tmp_path / "r.png").size[0] > 300
@@ -126,7 +126,7 @@ def test_triangles_hide_what_is_behind_them():
         assert (depth > 0).all() and (depth > 0.3).sum() >= inside.sum()
 
 
-def test_hits_are_plotted(library: Library, tmp_path):
+def test_hits_are_plotted(library: Layer, tmp_path):
     for ending in ("png", "svg"):
         plot_hits(tmp_path / f"hits.{ending}", library.strikes, "performer")
         assert (tmp_path / f"hits.{ending}").stat().st_size > 10_000
@@ -135,7 +135,7 @@ def test_hits_are_plotted(library: Library, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def fight(library: Library) -> Recording:
+def fight(library: Layer) -> Recording:
     return record(LiveScene(load_scene("sparring"), library, seed=3), 8.0)
 
 

@@ -13,7 +13,7 @@ from kumite.control import STYLES, CheckPoint, Progress, Route
 from kumite.errors import KumiteError
 from kumite.export.gltf import write_glb
 from kumite.export.sheet import recording_sheet
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.scene import (
     BoutScene,
     Playback,
@@ -180,7 +180,7 @@ def test_a_cue_comes_when_all_whom_it_waits_for_are_there():
 
 
 @pytest.fixture(scope="module")
-def actions() -> Library:
+def actions() -> Layer:
     return builtin(level="actions")
 
 
@@ -191,7 +191,7 @@ def _settings(**more) -> dict[str, Any]:
     return {**settings, **more}
 
 
-def _scene(actions: Library, **more) -> BoutScene:
+def _scene(actions: Layer, **more) -> BoutScene:
     return BoutScene(SceneSettings.model_validate(_settings(**more)), actions, seed=1)
 
 
@@ -205,7 +205,7 @@ CHANGED = {
 
 
 @pytest.mark.parametrize("field", CHANGED)
-def test_a_cue_changes_what_it_names_and_a_restart_takes_it_back(actions: Library, field: str):
+def test_a_cue_changes_what_it_names_and_a_restart_takes_it_back(actions: Layer, field: str):
     told, expected = CHANGED[field]
     scene = _scene(actions, cue=[{"who": "red", "at": 0.05, **told}])
     before = copy.deepcopy(scene.players)
@@ -223,7 +223,7 @@ def test_a_cue_changes_what_it_names_and_a_restart_takes_it_back(actions: Librar
     assert scene.players == before
 
 
-def test_a_cue_gives_another_opponent_and_another_route(actions: Library):
+def test_a_cue_gives_another_opponent_and_another_route(actions: Layer):
     point = {"place": (2.0, 1.0), "radius": 0.3}
     cue = {"who": "blue", "at": 0.05, "against": "green", "point": [point]}
     scene = _scene(actions, cue=[cue])
@@ -236,7 +236,7 @@ def test_a_cue_gives_another_opponent_and_another_route(actions: Library):
     assert scene.floor.opponent.tolist() == [1, 0, 0] and scene.progress[1] is None
 
 
-def test_who_is_run_over_falls_and_lies_and_the_other_only_idles(actions: Library):
+def test_who_is_run_over_falls_and_lies_and_the_other_only_idles(actions: Layer):
     settings = _settings(
         vehicle=[{"name": "car", "at": 0.2, "start": (-9.0, 1.2), "end": (9.0, 1.2), "speed": 14.0}]
     )
@@ -256,7 +256,7 @@ def test_who_is_run_over_falls_and_lies_and_the_other_only_idles(actions: Librar
     assert not [e for e in later if e.kind in ("strike", "hit")]
 
 
-def test_a_recording_shows_the_vehicle_wherever_objects_are_shown(actions: Library, tmp_path):
+def test_a_recording_shows_the_vehicle_wherever_objects_are_shown(actions: Layer, tmp_path):
     vehicle = {"name": "car", "at": 0.1, "start": (5.0, -6.0), "end": (5.0, 9.0), "size": (2, 1, 4)}
     scene = _scene(actions, vehicle=[vehicle])
     save_recording(tmp_path / "v.rec", record(scene, 1.0))
@@ -336,7 +336,7 @@ def test_check_points_count_from_either_end(check_point: int):
 
 
 @pytest.mark.parametrize("orders", [{"wanted": ["dance"]}, {"only": ["dance"]}, {"only": ["fall"]}])
-def test_cues_of_unknown_actions_are_refused(actions: Library, orders: dict):
+def test_cues_of_unknown_actions_are_refused(actions: Layer, orders: dict):
     with pytest.raises(KumiteError, match="cue of red"):
         _scene(actions, cue=[{"who": "red", "at": 1.0, **orders}])
 

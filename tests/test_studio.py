@@ -11,7 +11,7 @@ import pytest
 
 from kumite.clip import forward_kinematics
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.scene import LiveScene, Playback, load_scene, record
 from kumite.studio import Studio, serve, wording
 from kumite.studio.pace import Pace
@@ -19,31 +19,31 @@ from tests import browser
 from tests.stranger import running, wait
 
 
-def live(library: Library, scene: str, seed: int = 1) -> LiveScene:
+def live(library: Layer, scene: str, seed: int = 1) -> LiveScene:
     return LiveScene(load_scene(scene), library, seed=seed)
 
 
-def test_nothing_listens_beyond_this_machine(library: Library):
+def test_nothing_listens_beyond_this_machine(library: Layer):
     with running(Studio(live(library, "sparring"), port=0)):
         mine = psutil.Process().net_connections(kind="inet")
         listening = {c.laddr.ip for c in mine if c.status == psutil.CONN_LISTEN}
         assert listening == {"127.0.0.1"}
 
 
-def test_a_hit_is_shown_where_it_landed(library: Library):
+def test_a_hit_is_shown_where_it_landed(library: Layer):
     hits = [e for e in record(live(library, "sparring"), 20.0).events if e.kind == "hit"]
     assert hits
     assert all(wording.place(e) == e.data["place"] for e in hits)
     assert all(wording.struck(e) == e.data["victim"] for e in hits)
 
 
-def test_it_ends_by_itself_and_says_where_it_is(library: Library):
+def test_it_ends_by_itself_and_says_where_it_is(library: Layer):
     said: list[str] = []
     serve(live(library, "sparring"), port=0, open_browser=False, seconds=1.0, announce=said.append)
     assert any("http://127.0.0.1:" in line for line in said)
 
 
-def test_a_taken_port_moves_on_or_is_an_error(library: Library):
+def test_a_taken_port_moves_on_or_is_an_error(library: Layer):
     stage = live(library, "sparring")
     with running(Studio(stage, port=0)) as first:
         port = first.server.get_port()
@@ -54,12 +54,12 @@ def test_a_taken_port_moves_on_or_is_an_error(library: Library):
             serve(stage, port=port, strict_port=True, open_browser=False, seconds=0.2)
 
 
-def test_a_host_that_is_not_ours_is_refused(library: Library):
+def test_a_host_that_is_not_ours_is_refused(library: Layer):
     with pytest.raises(KumiteError):
         Studio(live(library, "sparring"), host="203.0.113.1", port=0)
 
 
-def test_it_keeps_time_pauses_steps_and_restarts(library: Library):
+def test_it_keeps_time_pauses_steps_and_restarts(library: Layer):
     stage = live(library, "sparring")
     with running(Studio(stage, port=0)) as studio:
         begin, frame = time.perf_counter(), stage.frame
@@ -88,7 +88,7 @@ def test_time_that_was_missed_is_not_made_up_for_ever():
     assert pace.take() <= 30
 
 
-def test_a_recording_plays_to_its_end_and_can_be_sought(library: Library):
+def test_a_recording_plays_to_its_end_and_can_be_sought(library: Layer):
     play = Playback(record(live(library, "sparring"), 1.0))
     with running(Studio(play, port=0)) as studio:
         assert wait(lambda: play.frame == len(play.recording) - 1)
@@ -112,7 +112,7 @@ def _look_side_on(client, studio: Studio) -> None:
 
 
 @pytest.mark.slow
-def test_both_bodies_are_seen_to_move(library: Library, chromium):
+def test_both_bodies_are_seen_to_move(library: Layer, chromium):
     stage = live(library, "sparring")
     with running(Studio(stage, port=0)) as studio, browser.open_page(studio.url) as (page, traffic):
         client = browser.client_of(studio.server, page)
@@ -158,7 +158,7 @@ def test_both_bodies_are_seen_to_move(library: Library, chromium):
 
 
 @pytest.mark.slow
-def test_the_target_is_dragged_and_the_boxer_goes_for_it(library: Library, chromium):
+def test_the_target_is_dragged_and_the_boxer_goes_for_it(library: Layer, chromium):
     stage = live(library, "target", seed=0)
     with running(Studio(stage, port=0)) as studio, browser.open_page(studio.url) as (page, traffic):
         client = browser.client_of(studio.server, page)

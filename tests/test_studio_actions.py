@@ -12,7 +12,7 @@ from kumite.annotate import DIRECTIONS, KINDS, NO_LIMB
 from kumite.body.palette import main_colours
 from kumite.clip import LIMBS, facing_frame, forward_kinematics
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.scene import ActionPlayback, action_recording
 from kumite.studio import Studio
 from kumite.studio.action_list import Filter, action_html
@@ -20,7 +20,7 @@ from tests import browser
 from tests.test_studio import running, wait
 
 
-def test_an_action_is_the_capture_from_the_origin(whole: Library):
+def test_an_action_is_the_capture_from_the_origin(whole: Layer):
     actions, clips = whole.actions, whole.clips
     assert actions is not None
     for k in range(0, len(actions), 31):
@@ -40,7 +40,7 @@ def test_an_action_is_the_capture_from_the_origin(whole: Library):
         assert [e.frame for e in one.events] == (blows - a).tolist()
 
 
-def test_it_plays_over_and_over(whole: Library):
+def test_it_plays_over_and_over(whole: Layer):
     stage = ActionPlayback(whole, 3)
     count = len(stage.recording)
     seen = []
@@ -54,14 +54,14 @@ def test_it_plays_over_and_over(whole: Library):
     assert len(stage.recording) == whole.actions.stop[5] - whole.actions.start[5]
 
 
-def test_only_actions_of_an_action_level_library(whole: Library, library: Library):
+def test_only_actions_of_an_action_level_library(whole: Layer, library: Layer):
     with pytest.raises(KumiteError, match="--level actions"):
         ActionPlayback(library)
     with pytest.raises(KumiteError, match=r"action 9999; expected 0 to \d+"):
         ActionPlayback(whole).choose(9999)
 
 
-def test_every_action_is_listed_once_by_clip_and_by_kind(whole: Library):
+def test_every_action_is_listed_once_by_clip_and_by_kind(whole: Layer):
     stage = ActionPlayback(whole)
     listed = Filter(stage)
     everything = list(range(len(stage.actions)))
@@ -82,7 +82,7 @@ def test_every_action_is_listed_once_by_clip_and_by_kind(whole: Library):
     assert listed.beside(everything[-1], 1) == 0 and listed.beside(0, -1) == everything[-1]
 
 
-def test_a_kind_that_a_clip_has_not_is_all_kinds(whole: Library):
+def test_a_kind_that_a_clip_has_not_is_all_kinds(whole: Layer):
     listed = Filter(ActionPlayback(whole))
     kinds = {c: (listed.set_clip(c), set(listed.kinds))[1] for c in listed.clips}
     with_reactions = next(c for c, k in kinds.items() if KINDS.index("reaction") in k)
@@ -93,7 +93,7 @@ def test_a_kind_that_a_clip_has_not_is_all_kinds(whole: Library):
     assert listed.kind is None and listed.actions
 
 
-def test_the_text_says_what_an_action_is(whole: Library):
+def test_the_text_says_what_an_action_is(whole: Layer):
     actions = whole.actions
     assert actions is not None
     odd = replace(actions, label=("<b>mine</b>", *actions.label[1:]))
@@ -123,7 +123,7 @@ def _pick(page, name: str, option: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_click_plays_an_action(whole: Library):
+def test_a_click_plays_an_action(whole: Layer):
     browser.need_chromium()
     stage = ActionPlayback(whole)
     actions = stage.actions

@@ -7,7 +7,7 @@ import pytest
 import viser
 
 from kumite.control import CheckPoint, Route
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.scene import BoutScene, SceneSettings, load_scene
 from kumite.studio import Studio
 from kumite.studio.paths import Path, Sketch, on_floor, sketched
@@ -16,7 +16,7 @@ from tests.test_studio import running, wait
 from tests.test_studio_actions import _pick, _text
 
 
-def fight(fighters: Library, pairs: int = 1) -> BoutScene:
+def fight(fighters: Layer, pairs: int = 1) -> BoutScene:
     """Boxing at depth 1, of so many pairs side by side."""
     settings = load_scene("boxing").model_dump(exclude_none=True)
     out = []
@@ -45,7 +45,7 @@ def test_a_sketch_is_seen_before_it_is_a_route():
     assert sketched(sketch) == []
 
 
-def test_one_fighters_controls_are_shown_however_many_there_are(fighters: Library):
+def test_one_fighters_controls_are_shown_however_many_there_are(fighters: Layer):
     for pairs in (1, 4):
         stage = fight(fighters, pairs)
         studio = Studio(stage, port=0)
@@ -57,7 +57,7 @@ def test_one_fighters_controls_are_shown_however_many_there_are(fighters: Librar
             studio.close()
 
 
-def test_routes_of_the_scene_are_on_the_floor_and_follow_what_is_told(fighters: Library):
+def test_routes_of_the_scene_are_on_the_floor_and_follow_what_is_told(fighters: Layer):
     stage = fight(fighters)
     stage.set_route("blue", Route((CheckPoint((0, 3)), CheckPoint((2, 3)))))
     studio = Studio(stage, port=0)
@@ -81,7 +81,7 @@ def test_routes_of_the_scene_are_on_the_floor_and_follow_what_is_told(fighters: 
 
 
 @pytest.mark.slow
-def test_a_path_is_drawn_dragged_and_cleared_with_the_mouse(fighters: Library):
+def test_a_path_is_drawn_dragged_and_cleared_with_the_mouse(fighters: Layer):
     browser.need_chromium()
     stage = fight(fighters)
     studio = Studio(stage, port=0)
@@ -157,7 +157,7 @@ def test_a_path_is_drawn_dragged_and_cleared_with_the_mouse(fighters: Library):
 
 
 @pytest.mark.slow
-def test_weights_and_actions_are_told_on_the_page(fighters: Library):
+def test_weights_and_actions_are_told_on_the_page(fighters: Layer):
     browser.need_chromium()
     stage = fight(fighters)
     red, blue = stage.players

@@ -11,7 +11,7 @@ import pytest
 from kumite.control.attack import thrown
 from kumite.control.avoidance import AvoidanceRules
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.rotation import planar_apply
 from kumite.scene import (
     DodgeScene,
@@ -37,12 +37,12 @@ from tests.test_studio import running, wait
 
 
 @pytest.fixture(scope="module")
-def avoiders() -> Library:
+def avoiders() -> Layer:
     """The built-in performer's library of avoidance."""
     return builtin("avoidance", "avoidance")
 
 
-def dodgeball(library: Library, throws: int = 0, count: int | None = None) -> DodgeScene:
+def dodgeball(library: Layer, throws: int = 0, count: int | None = None) -> DodgeScene:
     settings: SceneSettings = load_scene("dodgeball" if count is None else "barrage")
     settings = settings if count is None else with_count(settings, count)
     return DodgeScene(with_throws(settings, throws), library, seed=1)
@@ -89,7 +89,7 @@ def test_a_ray_that_passes_everybody_goes_as_far_as_they_are():
     assert away.goal[2] > EYE[2] and np.isfinite(away.goal).all()
 
 
-def test_clicks_wait_for_the_thread_that_steps(avoiders: Library):
+def test_clicks_wait_for_the_thread_that_steps(avoiders: Layer):
     stage = dodgeball(avoiders)
     studio = Studio(stage, port=0)
     try:
@@ -111,7 +111,7 @@ def test_clicks_wait_for_the_thread_that_steps(avoiders: Library):
         studio.close()
 
 
-def test_throws_by_hand_leave_the_stream_as_it_is(avoiders: Library):
+def test_throws_by_hand_leave_the_stream_as_it_is(avoiders: Layer):
     by_itself, helped = dodgeball(avoiders, throws=3), dodgeball(avoiders, throws=3)
     helped.throw_one(20.0, 0.3)
     for _ in range(240):
@@ -125,7 +125,7 @@ def test_throws_by_hand_leave_the_stream_as_it_is(avoiders: Library):
     assert helped.objects[0].radius == 0.3 and helped.objects[1].radius == 0.11
 
 
-def test_the_stream_is_switched_on_and_off(avoiders: Library):
+def test_the_stream_is_switched_on_and_off(avoiders: Layer):
     stage = dodgeball(avoiders)
     assert not stage.streams
     for _ in range(330):
@@ -145,7 +145,7 @@ def test_the_stream_is_switched_on_and_off(avoiders: Library):
 # Tuning ------------------------------------------------------------------------------------------
 
 
-def test_controls_act_on_the_next_search_and_no_other(avoiders: Library):
+def test_controls_act_on_the_next_search_and_no_other(avoiders: Layer):
     stage = dodgeball(avoiders)
     before = stage.search
     controls = {c.field: c for c in stage.controls}
@@ -167,7 +167,7 @@ def test_controls_act_on_the_next_search_and_no_other(avoiders: Library):
     assert stage.search.settings.window == 2.0
 
 
-def test_searches_under_way_keep_their_rules(avoiders: Library):
+def test_searches_under_way_keep_their_rules(avoiders: Layer):
     stage = dodgeball(avoiders)
     goal, standing = stage.root_position[0], stage.dodgers.standing(0)
     attacks = [
@@ -194,7 +194,7 @@ def test_searches_under_way_keep_their_rules(avoiders: Library):
 # Volumes -----------------------------------------------------------------------------------------
 
 
-def test_switches_add_and_remove_volumes(avoiders: Library):
+def test_switches_add_and_remove_volumes(avoiders: Layer):
     stage = dodgeball(avoiders, throws=40)
     studio = Studio(stage, port=0)
     try:
@@ -229,7 +229,7 @@ def test_switches_add_and_remove_volumes(avoiders: Library):
         studio.close()
 
 
-def test_the_avoidance_volume_is_where_the_body_comes_by(avoiders: Library):
+def test_the_avoidance_volume_is_where_the_body_comes_by(avoiders: Layer):
     stage = dodgeball(avoiders, throws=40)
     near, plan, left = [], None, None
     for _ in range(2400):
@@ -289,7 +289,7 @@ def test_what_is_said_of_a_throw_and_a_search():
     assert "stretch 7" in said("decision", stretch=7, jump=False, frames=12)
 
 
-def test_throws_are_counted(avoiders: Library):
+def test_throws_are_counted(avoiders: Layer):
     stage = dodgeball(avoiders, throws=8)
     log = EventLog(stage.names, dodging=True)
     for _ in range(1300):
@@ -308,7 +308,7 @@ def test_throws_are_counted(avoiders: Library):
 # Many, and recordings ----------------------------------------------------------------------------
 
 
-def test_many_dodge_and_unseen_balls_are_hidden(avoiders: Library):
+def test_many_dodge_and_unseen_balls_are_hidden(avoiders: Layer):
     stage = dodgeball(avoiders, throws=100, count=30)
     studio = Studio(stage, port=0)
     try:
@@ -326,7 +326,7 @@ def test_many_dodge_and_unseen_balls_are_hidden(avoiders: Library):
         studio.close()
 
 
-def test_a_recording_of_dodging_shows_the_balls(avoiders: Library, tmp_path):
+def test_a_recording_of_dodging_shows_the_balls(avoiders: Layer, tmp_path):
     save_recording(tmp_path / "d.rec", record(dodgeball(avoiders, throws=4), 5.0))
     play = Playback(load_recording(tmp_path / "d.rec"))
     assert all(o.thrown for o in play.objects)
@@ -349,7 +349,7 @@ def test_a_recording_of_dodging_shows_the_balls(avoiders: Library, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_click_throws_a_ball_and_switches_show_volumes(avoiders: Library):
+def test_a_click_throws_a_ball_and_switches_show_volumes(avoiders: Layer):
     browser.need_chromium()
     stage = dodgeball(avoiders)
     studio = Studio(stage, port=0)

@@ -10,7 +10,7 @@ import pytest
 
 from kumite.annotate import find_balance
 from kumite.body import skin_vertices
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.rotation import from_yaw, rotate
 from kumite.scene import (
     Playback,
@@ -34,13 +34,13 @@ Make = Callable[..., PrepareScene]
 
 
 @pytest.fixture(scope="module")
-def targets() -> Library:
+def targets() -> Layer:
     """The built-in performer's library for preparation."""
     return builtin("targets", "preparation")
 
 
 @pytest.fixture(scope="module")
-def make(targets: Library, tmp_path_factory) -> Make:
+def make(targets: Layer, tmp_path_factory) -> Make:
     """Scenes that share what was learned."""
     folder: Path = tmp_path_factory.mktemp("learned")
 
@@ -219,7 +219,7 @@ def test_who_is_led_through_a_brawl_prepares_for_the_nearest_opponent(make: Make
 # What is seen ------------------------------------------------------------------------------------
 
 
-def test_the_posture_is_in_balance_as_it_was_found(make: Make, targets: Library):
+def test_the_posture_is_in_balance_as_it_was_found(make: Make, targets: Layer):
     stage = make("ball-kick")
     studio = Studio(stage, port=0)
     try:

@@ -11,7 +11,7 @@ import pytest
 from kumite.clip import LIMBS, forward_kinematics
 from kumite.control import approach_motions, gradual
 from kumite.control.guide import Guide, learned_guide
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.graph.hierarchy import ways_into_cores
 from kumite.graph.preparing import KINDS
 from kumite.rotation import (
@@ -34,12 +34,12 @@ QUICK = gradual(places=16, batch=1)
 
 
 @pytest.fixture(scope="module")
-def targets() -> Library:
+def targets() -> Layer:
     return builtin("targets", "preparation")
 
 
 @pytest.fixture(scope="module")
-def guide(targets: Library, tmp_path_factory: pytest.TempPathFactory) -> Guide:
+def guide(targets: Layer, tmp_path_factory: pytest.TempPathFactory) -> Guide:
     assert targets.preparing is not None
     curve = np.ones(len(targets.preparing.hierarchy.targets))
     return learned_guide(targets, tmp_path_factory.mktemp("learned"), curve, gaits=["walk"])
@@ -49,7 +49,7 @@ def some_walkers(guide: Guide, homes: np.ndarray, preparation: str = "ours") -> 
     return Walkers(guide, homes, lambda kind, k, **data: None, preparation=preparation)
 
 
-def tip_at(library: Library, frame: int, limb: int) -> np.ndarray:
+def tip_at(library: Layer, frame: int, limb: int) -> np.ndarray:
     """The tip of a limb in a captured frame, by kinematics of its own."""
     clips = library.clips
     position, world = forward_kinematics(
@@ -64,7 +64,7 @@ def tip_at(library: Library, frame: int, limb: int) -> np.ndarray:
 
 @pytest.mark.parametrize("preparation", ["ours", "none"])
 def test_begun_at_its_stance_a_blow_meets_its_object_unbent(
-    targets: Library, guide: Guide, preparation: str
+    targets: Layer, guide: Guide, preparation: str
 ):
     w = some_walkers(guide, np.zeros((1, 3)), preparation)
     p, clips = targets.preparing, targets.clips
@@ -86,7 +86,7 @@ def test_begun_at_its_stance_a_blow_meets_its_object_unbent(
             assert abs(wrap_angle(ahead - stance[2])) < 1e-6
 
 
-def test_begun_at_its_stance_an_obstacle_is_passed_in_its_middle(targets: Library, guide: Guide):
+def test_begun_at_its_stance_an_obstacle_is_passed_in_its_middle(targets: Layer, guide: Guide):
     w, p, clips = some_walkers(guide, np.zeros((1, 3))), targets.preparing, targets.clips
     assert p is not None
     pelvis = clips.skeleton.joint("pelvis")
@@ -104,7 +104,7 @@ def test_begun_at_its_stance_an_obstacle_is_passed_in_its_middle(targets: Librar
 
 
 @pytest.mark.parametrize("off", [0.0, 0.1, 0.3, OFF + 0.05])
-def test_blows_are_bent_as_far_as_allowed(targets: Library, guide: Guide, off: float):
+def test_blows_are_bent_as_far_as_allowed(targets: Layer, guide: Guide, off: float):
     p = targets.preparing
     assert p is not None
     for t in np.flatnonzero(p.kind == STRIKE).tolist():
@@ -130,7 +130,7 @@ def test_blows_are_bent_as_far_as_allowed(targets: Library, guide: Guide, off: f
             assert left < (0.01 if off <= 0.1 else 0.03), p.hierarchy.targets.label[t]
 
 
-def clips_facing(library: Library, w: Walkers, t: int) -> np.ndarray:
+def clips_facing(library: Layer, w: Walkers, t: int) -> np.ndarray:
     """The facing frame of the library at which target t would be begun now."""
     return library.clips.facing[w._best_beginning(0, t)[0]]
 
@@ -147,7 +147,7 @@ def test_who_does_nothing_shows_its_cast(guide: Guide):
         np.testing.assert_allclose(w.shown.position, w.cast.position, atol=1e-12)
 
 
-def test_ways_into_cores_are_the_shortest(targets: Library):
+def test_ways_into_cores_are_the_shortest(targets: Layer):
     """By search from every state, one stretch after another."""
     p, table = targets.preparing, targets.table
     assert p is not None
@@ -191,13 +191,13 @@ def test_ways_into_cores_are_the_shortest(targets: Library):
 # Things -------------------------------------------------------------------------------------------
 
 
-def some_things(library: Library, *settings: TargetSettings) -> Things:
+def some_things(library: Layer, *settings: TargetSettings) -> Things:
     p = library.preparing
     assert p is not None
     return Things(settings, p, p.hierarchy.targets.label)
 
 
-def test_a_ball_never_gains_energy_and_comes_to_rest(targets: Library):
+def test_a_ball_never_gains_energy_and_comes_to_rest(targets: Layer):
     ball = TargetSettings(name="ball", motion="kick_ball", position=(1.0, 2.0))
     rng = np.random.default_rng(3)
     for _ in range(10):
@@ -219,7 +219,7 @@ def test_a_ball_never_gains_energy_and_comes_to_rest(targets: Library):
         np.testing.assert_array_equal(things.objects[0].position, things.position[0])
 
 
-def test_what_hangs_comes_back(targets: Library):
+def test_what_hangs_comes_back(targets: Layer):
     pad = TargetSettings(name="pad", motion="punch", position=(0.0, 0.0))
     things = some_things(targets, pad)
     assert not things.lies[0]
@@ -231,7 +231,7 @@ def test_what_hangs_comes_back(targets: Library):
     assert 0.1 < max(far) < 1.0 and far[-1] < 1e-3
 
 
-def test_things_move_alike_together_and_alone(targets: Library):
+def test_things_move_alike_together_and_alone(targets: Layer):
     """Arrays of things against one at a time."""
     settings = [
         TargetSettings(name=f"{m} {n}", motion=m, position=(3.0 * n, 0.0))
@@ -251,7 +251,7 @@ def test_things_move_alike_together_and_alone(targets: Library):
             np.testing.assert_array_equal(together.position[n], one.position[0])
 
 
-def test_inside_of_obstacles_by_their_corners(targets: Library):
+def test_inside_of_obstacles_by_their_corners(targets: Layer):
     bar = TargetSettings(name="bar", motion="duck_under", position=(2, -1), yaw_deg=40, width=3.0)
     things, rng = some_things(targets, bar), np.random.default_rng(7)
     yaw = np.radians(40)
@@ -263,7 +263,7 @@ def test_inside_of_obstacles_by_their_corners(targets: Library):
         assert things.inside(place) == expected
 
 
-def test_gates_lead_across_obstacles_from_either_side(targets: Library):
+def test_gates_lead_across_obstacles_from_either_side(targets: Layer):
     bar = TargetSettings(name="bar", motion="duck_under", position=(2, -1), yaw_deg=40, width=3.0)
     things = some_things(targets, bar)
     yaw = np.radians(40)
@@ -278,7 +278,7 @@ def test_gates_lead_across_obstacles_from_either_side(targets: Library):
             assert abs(wrap_angle(through[0] - expected)) < 1e-9
 
 
-def test_settled_policies_are_kept(targets: Library, tmp_path: Path):
+def test_settled_policies_are_kept(targets: Layer, tmp_path: Path):
     curve = np.array([1.0, 1.0, 0.5, 1.0, 1.0, 1.0])  # of six target motions
     first = learned_guide(targets, tmp_path, curve, gaits=["walk"], levels=False)
     kept = sorted(p.name for p in tmp_path.iterdir())
@@ -288,7 +288,7 @@ def test_settled_policies_are_kept(targets: Library, tmp_path: Path):
         np.testing.assert_array_equal(a.best, b.best)
 
 
-def test_targets_with_the_same_curve_share_a_policy(targets: Library, tmp_path: Path):
+def test_targets_with_the_same_curve_share_a_policy(targets: Layer, tmp_path: Path):
     """Section 6: what a controller has to know of a target is the C of its root."""
     walker = {"name": "anna", "position": (0.0, 0.0)}
 

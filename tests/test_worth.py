@@ -31,7 +31,7 @@ from kumite.control.worth import (
     within_a_walk,
 )
 from kumite.errors import KumiteError
-from kumite.graph import ActionTable, Library
+from kumite.graph import ActionTable, Layer
 from kumite.kernels import policy as kernels
 from kumite.rotation import planar_apply, planar_inverse
 from tests import toys
@@ -40,7 +40,7 @@ FPS = 30.0
 STATES, WAYS = 4, 3  # of the toy, and actions of each state
 
 
-def wander(seed: int, frames: int = 6) -> Library:
+def wander(seed: int, frames: int = 6) -> Layer:
     """Four states, three random ways out of each, of ``frames`` or two thirds of them, each of
     which steps and turns at random; hits in the longer stretches.
     """
@@ -190,7 +190,7 @@ def test_merging_only_makes_it_later():
 
 
 @pytest.mark.parametrize("again", [1, 4])
-def test_the_policy_chooses_as_a_fighter_does(library: Library, again: int):
+def test_the_policy_chooses_as_a_fighter_does(library: Layer, again: int):
     """A fighter without chance, boredom and cone, followed until it hits."""
     near, hit = solve(library, approach()), solve(library, strike(library))
     skill = Skill(library, near, hit, stretch_tracks(library))
@@ -232,7 +232,7 @@ def test_targets_are_drawn_where_they_should_be():
     assert walked[:, 1].min() >= grid.low[2] and walked[:, 1].max() <= grid.high[2]
 
 
-def test_the_performers_policies_are_nearly_as_soon_as_the_best_path(library: Library):
+def test_the_performers_policies_are_nearly_as_soon_as_the_best_path(library: Layer):
     near, hit = solve(library, approach()), solve(library, strike(library))
     skill = Skill(library, near, hit, stretch_tracks(library))
     worth = measure_worth(skill, 12, 1)

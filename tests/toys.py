@@ -6,7 +6,7 @@ import numpy as np
 
 from kumite.annotate import Contacts, Strikes
 from kumite.clip import Clip, ClipSet, Skeleton, concatenate
-from kumite.graph import ActionTable, Library
+from kumite.graph import ActionTable, Layer
 from kumite.rotation import from_yaw
 
 _BONES = (
@@ -74,7 +74,7 @@ def clip_set(lengths: list[int], fps: float = 30.0) -> ClipSet:
     return concatenate([still(n, name=f"clip{i}", fps=fps) for i, n in enumerate(lengths)])
 
 
-def library(table: ActionTable, frames: int, tips: dict[int, tuple] | None = None) -> Library:
+def library(table: ActionTable, frames: int, tips: dict[int, tuple] | None = None) -> Layer:
     """A library whose body stands still; tips: frame -> (place [3], speed) of left-hand hits."""
     clips = clip_set([frames])
     effective = np.zeros((frames, 4), bool)
@@ -83,4 +83,4 @@ def library(table: ActionTable, frames: int, tips: dict[int, tuple] | None = Non
         effective[f, 0], tip[f, 0], speed[f, 0] = True, place, v
     empty = np.zeros(0, np.int32)
     strikes = Strikes(effective, tip, speed, empty, empty, empty, empty, np.zeros((0, 3)))
-    return Library(clips, Contacts(np.ones((frames, 2), bool), np.zeros((2, 2))), strikes, table)
+    return Layer(clips, Contacts(np.ones((frames, 2), bool), np.zeros((2, 2))), strikes, table)

@@ -58,9 +58,9 @@ def _clips(folder: Path):
 
 @cache
 def _library(folder: Path):
-    from kumite.graph import build_library
+    from kumite.graph import build_frames
 
-    return build_library(_clips(folder))
+    return build_frames(_clips(folder))
 
 
 @_figure("read the boxer folder", "s", 1.0)
@@ -114,16 +114,16 @@ def _distance(folder: Path) -> float:
 
 @_figure("graph, joins at left lift-off", "s", 5.0)
 def _graph(folder: Path) -> float:
-    from kumite.graph import build_library
+    from kumite.graph import build_frames
 
-    return _best(lambda: build_library(_clips(folder)))
+    return _best(lambda: build_frames(_clips(folder)))
 
 
 @_figure("graph, all pairs of frames", "s", 5.0)
 def _whole_graph(folder: Path) -> float:
-    from kumite.graph import build_library
+    from kumite.graph import build_frames
 
-    return _best(lambda: build_library(_clips(folder), event="none"))
+    return _best(lambda: build_frames(_clips(folder), event="none"))
 
 
 def _solve(folder: Path, name: str):
@@ -362,10 +362,10 @@ FIGHT_SECONDS = 8.0
 def _places(folder: Path):
     """The game of a fight of the folder's actions, and (game, state, players, recent) at moments at
     which someone chooses."""
-    from kumite.graph import build_action_library
+    from kumite.graph import build_actions
     from kumite.scene import BoutScene, load_scene, record
 
-    scene = BoutScene(load_scene("boxing"), build_action_library(_clips(folder)), seed=1)
+    scene = BoutScene(load_scene("boxing"), build_actions(_clips(folder)), seed=1)
     tree, decide, found = scene.tree, scene.tree.decide, []
 
     def note(state, players, recent, others):

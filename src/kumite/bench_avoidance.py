@@ -43,7 +43,7 @@ def avoidance_figures(best: Best) -> dict[str, Figure]:
 def sixteen(fps: float = 60.0) -> Any:
     """As the paper's: a library of 2 min 40 s with 16 avoidance motions, each of them once."""
     from kumite.clip import concatenate
-    from kumite.graph import build_avoidance_library
+    from kumite.graph import build_avoidance
     from kumite.performer.avoidance import AVOIDANCE
     from kumite.performer.take import perform_take, vary
 
@@ -59,7 +59,7 @@ def sixteen(fps: float = 60.0) -> Any:
     order = rng.permutation(len(labels))
     score = [vary(AVOIDANCE.find(labels[k]), AVOIDANCE, rng) for k in order]
     clip, _ = perform_take("sixteen", score, AVOIDANCE, rng=rng)
-    return build_avoidance_library(concatenate([clip], fps))
+    return build_avoidance(concatenate([clip], fps))
 
 
 @cache

@@ -72,9 +72,9 @@ def _learning(best: Best, gradually: bool) -> float:
 @cache
 def _targets():
     from kumite.control import cache_folder
-    from kumite.graph import builtin_library
+    from kumite.graph import builtin_layer
 
-    return builtin_library(cache_folder(None), style="targets", level="preparation")
+    return builtin_layer(cache_folder(None), style="targets", level="preparation")
 
 
 def _drill(best: Best) -> float:

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numbers
 import operator
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -242,6 +243,23 @@ def freeze(
         sizes.update({s: n for s, n in zip(shape, out.shape) if isinstance(s, str)})
         object.__setattr__(record, name, read_only(out, given))
     return sizes
+
+
+def freeze_mapping(
+    record: object, field: str, keys: Sequence[str], of: type, what: str
+) -> Mapping[str, Any]:
+    """Check a frozen dataclass' mapping, and keep it read-only, in the order of ``keys``.
+
+    Errors: no mapping; another key; a value of another type.
+    """
+    given = mapping(getattr(record, field), what)
+    for key, value in given.items():
+        if key not in keys:
+            raise KumiteError(f"{what}: {shown(key)}; expected one of {', '.join(keys)}")
+        instance(value, of, f"{what}: {key}")
+    kept = MappingProxyType({key: given[key] for key in keys if key in given})
+    object.__setattr__(record, field, kept)
+    return kept
 
 
 def _refuse_shape(found: tuple[int, ...], what: str, shape: tuple[Size | Any, ...]) -> None:

@@ -38,11 +38,11 @@ from kumite.export.gltf import write_glb
 from kumite.export.moments import moments
 from kumite.export.sheet import recording_sheet
 from kumite.graph import (
-    Library,
-    assess,
-    build_action_library,
-    build_library,
-    build_preparation_library,
+    Layer,
+    assess_library,
+    build_actions,
+    build_frames,
+    build_preparation,
     load_library,
     save_library,
 )
@@ -83,7 +83,7 @@ def clips(style: str = "boxing") -> ClipSet:
 
 
 @functools.cache
-def libraries() -> dict[str, Library]:
+def libraries() -> dict[str, Layer]:
     """One of every level."""
     made = performer.perform("targets", mirrored=False)
     fps = 15.0
@@ -91,9 +91,9 @@ def libraries() -> dict[str, Library]:
     targets, contacts = authored_targets(walks, made.truth, made.clips[0].fps), find_contacts(walks)
     cycles = find_cycles(walks, contacts)
     return {
-        "frames": build_library(clips(), avoidance=True, event="both"),
-        "actions": build_action_library(clips()),
-        "preparation": build_preparation_library(walks, targets, cycles, contacts=contacts),
+        "frames": build_frames(clips(), avoidance=True, event="both"),
+        "actions": build_actions(clips()),
+        "preparation": build_preparation(walks, targets, cycles, contacts=contacts),
     }
 
 
@@ -192,7 +192,7 @@ def _looks_deep(every: int) -> bool:
 
 
 def forged_library(rng: Rng, folder: Path) -> None:
-    from kumite.graph.library import KIND, VERSION
+    from kumite.graph.library_file import KIND, VERSION
 
     level = str(rng.choice(["frames", "actions", "preparation"]))
     good = _saved(folder, f"{level}.kumite", lambda p: save_library(p, libraries()[level]))
@@ -201,14 +201,14 @@ def forged_library(rng: Rng, folder: Path) -> None:
     library = load_library(path)
     library_lines(library)
     json.dumps(library_values(library), allow_nan=False)
-    assess(library).rows()
+    assess_library(library)
     if _looks_deep(8):
         save_library(folder / "again.kumite", library)
         assert load_library(folder / "again.kumite").digest == library.digest
-        _run(library, level)
+        _run(library.layer(level), level)
 
 
-def _run(library: Library, level: str) -> None:
+def _run(library: Layer, level: str) -> None:
     """Have the characters of a scene made for it do something."""
     from kumite.scene import BoutScene, PrepareScene
 

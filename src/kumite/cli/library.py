@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,7 @@ from kumite.errors import KumiteError
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from kumite.graph import Library
+    from kumite.graph import Layer, Library
     from kumite.graph.preparing import Preparing
 
 ENDING = ".kumite"
@@ -27,25 +28,38 @@ def is_library(source: Path | str) -> bool:
     if not os.path.isfile(source):  # noqa: PTH113 - Path.is_file raises on names that are too long
         return False
     from kumite import files
-    from kumite.graph.library import KIND
+    from kumite.graph.library_file import KIND
 
     return files.kind_of(source) == KIND
 
 
 def library_values(library: Library) -> dict[str, Any]:
-    """What a library holds, as JSON values: how it was built, then what is counted here."""
+    """What a library holds, as JSON values: what its layers share, then each of them."""
+    from kumite.graph import assess_library
+
+    worth, verdicts = assess_library(library)
+    return {
+        "clips": len(library.clips.names),
+        "frames": len(library.clips),
+        "fps": library.clips.fps,
+        "layers": {
+            name: {
+                **layer_values(layer),
+                "digest": layer.digest,
+                "worth": worth[name].to_json(),
+            }
+            for name, layer in library.layers.items()
+        },
+        "missing": dict(library.missing),
+        "scenes": [asdict(verdict) for verdict in verdicts],
+    }
+
+
+def layer_values(library: Layer) -> dict[str, Any]:
+    """What a layer holds, as JSON values: how it was built, then what is counted here."""
     import numpy as np
 
-    from kumite.graph import assess
-
-    clips = library.clips
-    values = {
-        "level": "frames" if library.actions is None else "actions",
-        **library.report,
-        "clips": len(clips.names),
-        "avoidance_parts": len(library.avoidance),
-    }
-    values["worth"] = assess(library).to_json()
+    values = {**library.report, "avoidance_parts": len(library.avoidance)}
     if library.preparing is not None:
         values["target_motions"] = _target_values(library.preparing)
     if library.actions is not None:
@@ -59,16 +73,23 @@ def library_values(library: Library) -> dict[str, Any]:
 
 
 def library_lines(library: Library) -> list[str]:
-    """What a library holds, to be read."""
+    """What a library holds, to be read: what its layers share, each of them, those it lacks."""
+    clips = library.clips
+    lines = [f"{len(clips)} frames of {len(clips.names)} clips at {clips.fps:g} frames/s"]
+    for name, layer in library.layers.items():
+        first, *more = layer_lines(layer)
+        lines += [f"{name}: {first}", *(f"  {line}" for line in more)]
+    return lines + [f"{name}: not built: {why}" for name, why in library.missing.items()]
+
+
+def layer_lines(library: Layer) -> list[str]:
+    """What a layer holds, to be read."""
     import numpy as np
 
     from kumite.annotate import KINDS
 
     r, clips, table = library.report, library.clips, library.table
-    lines = [
-        f"{len(clips)} frames of {len(clips.names)} clips at {clips.fps:g} frames/s, "
-        f"{len(library.strikes)} blows"
-    ]
+    lines = [f"{len(library.strikes)} blows"]
     if len(library.avoidance):
         held = len(np.unique(library.parts_of_stretch[1]))
         mean = float(np.mean(library.avoidance.stop - library.avoidance.start)) / clips.fps
@@ -118,17 +139,24 @@ def library_lines(library: Library) -> list[str]:
 
 
 def worth_table(library: Library) -> Table:
-    """What a library is worth: what of its clips it reaches, its joins, scenes it is good for."""
+    """What a library is worth: what of its clips each layer reaches, its joins, and what kinds of
+    scenes the library is good for."""
     from rich.table import Table
     from rich.text import Text
 
-    from kumite.graph import assess
+    from kumite.graph import assess_library
 
     table = Table(title="what it is worth", show_header=False)
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
-    for label, text in assess(library).rows():
-        table.add_row(Text(label), Text(text))
+    worth, verdicts = assess_library(library)
+    for name, found in worth.items():
+        table.add_row(Text(f"layer {name}", style="bold"))
+        for label, text in found.rows():
+            table.add_row(Text(label), Text(text))
+        table.add_section()
+    for verdict in verdicts:
+        table.add_row(Text(verdict.kind), Text(str(verdict)))
     return table
 
 
@@ -136,7 +164,7 @@ def _says(report: Mapping[str, Any], *names: str) -> bool:
     return all(name in report for name in names)
 
 
-def _preparation_lines(library: Library) -> list[str]:
+def _preparation_lines(library: Layer) -> list[str]:
     """Cores with the pace of each, then a target a line: what it is about, and where."""
     import numpy as np
 
@@ -205,7 +233,7 @@ def _target_values(preparing: Preparing) -> list[dict[str, Any]]:
     ]
 
 
-def _ranges(library: Library) -> list[tuple[int, int]]:
+def _ranges(library: Layer) -> list[tuple[int, int]]:
     return list(zip(library.table.first.tolist(), library.table.last.tolist()))
 
 
@@ -219,7 +247,7 @@ def show_library(path: Path | str, plot: Path | None, as_json: bool, given: list
     if plot is not None:
         from kumite.export.plot import plot_hits
 
-        plot_hits(plot, library.strikes, str(path))
+        plot_hits(plot, next(iter(library.layers.values())).strikes, str(path))
     clips = library.clips
     names = dict(zip(clips.names, (round(c.seconds, 2) for c in clips)))
     if as_json:

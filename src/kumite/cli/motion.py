@@ -19,7 +19,7 @@ from kumite.cli.library import (
 from kumite.cli.progress import Bars, Stages, progress
 from kumite.cli.reading import FpsOption, Reading, SkipBad, Source, reads_mocap
 from kumite.cli.recording import is_recording, show_recording
-from kumite.errors import KumiteError, unknown
+from kumite.errors import KumiteError
 
 if TYPE_CHECKING:
     from kumite.mocap import Loaded
@@ -137,14 +137,16 @@ def _end_with_bad(loaded: Loaded) -> None:
 def build(
     source: Source,
     output: Annotated[Path, typer.Option("--output", "-o", help="The library file to write.")],
-    level: Annotated[
-        str,
+    layer: Annotated[
+        list[str] | None,
         typer.Option(
-            help="A graph of frames, of whole actions (kumite segment), one in which an "
-            "avoidance can soon be begun, or one of locomotion and what it prepares for "
-            "(preparation)."
+            "--layer",
+            "--level",
+            help="Only that motion graph: frames (policies), actions (fights by game tree), "
+            "avoidance, or preparation (walks and what they lead to); may be repeated. Default: "
+            "all that the clips allow.",
         ),
-    ] = "frames",
+    ] = None,
     event: Annotated[
         str | None,
         typer.Option(
@@ -159,14 +161,13 @@ def build(
     actions: Annotated[
         Path | None,
         typer.Option(
-            help="The text file of 'kumite segment', for its actions (--level actions), its "
-            "avoidance parts (--avoidance, --level avoidance), or the target motions and cycles "
-            "that you marked (--level preparation); default: as found."
+            help="The text file of 'kumite segment', for its actions, its avoidance parts, and the "
+            "target motions and cycles that you marked; default: as found."
         ),
     ] = None,
     avoidance: Annotated[
         bool,
-        typer.Option(help="Keep avoidance parts whole: each within one edge of the graph."),
+        typer.Option(help="Frames and actions: keep avoidance parts whole, each within one edge."),
     ] = False,
     alike: Annotated[
         float | None,
@@ -219,53 +220,44 @@ def build(
     reading: Reading,
 ) -> None:
     """Build a library: clips, contacts, effective hits and the motion graph, in one file."""
-    from kumite.annotate import read_actions, read_avoidance
     from kumite.files import refuse_unwritable
-    from kumite.graph import (
-        JoinBound,
-        build_action_library,
-        build_avoidance_library,
-        build_library,
-        save_library,
-    )
+    from kumite.graph import LAYERS, JoinBound, build_library, save_library
 
     bound = JoinBound(**_given(height=join_height, angle=join_angle, speed=join_speed))
-    if avoidance and level == "preparation":
-        raise KumiteError("--avoidance: of other levels; expected none with --level preparation")
     if most is not None and actions is not None:
         raise KumiteError("--most: of targets that are found; expected none with --actions")
-    avoidance = avoidance or level == "avoidance"
-    _refuse_of_another_level(
-        level,
+    wanted = tuple(layer) if layer else LAYERS
+    options = _options_of_layers(
+        wanted,
         {
-            "frames": {"--event": event, "--per-second": per_second},
-            "actions": {
-                "--actions": None if avoidance or level == "preparation" else actions,
-                "--alike": None if level == "preparation" else alike,
-                "--most-ways": most_ways,
-            },
-            "avoidance": {"--every": every, "--offered": offered},
-            "preparation": {"--threshold": threshold, "--most": most},
+            "--event": (event, "event", ("frames",)),
+            "--per-second": (per_second, "per_second", ("frames",)),
+            "--alike": (alike, "alike", ("actions", "preparation")),
+            "--most-ways": (most_ways, "most_ways", ("actions",)),
+            "--every": (every, "every", ("avoidance",)),
+            "--offered": (offered, "offered", ("avoidance",)),
+            "--threshold": (threshold, "threshold", ("preparation",)),
+            "--most": (most, "most", ("preparation",)),
+            "--avoidance": (avoidance or None, "avoidance", ("frames", "actions")),
         },
     )
+    if actions is not None and wanted == ("frames",) and not avoidance:
+        raise KumiteError(
+            "--actions: of other layers; expected none with --layer frames without --avoidance"
+        )
     refuse_unwritable(output)  # before the work, not after
     loaded = reading.load(source, fps, skip_bad=skip_bad)
     with progress() as bars:
         stages, clips = Stages(bars), loaded.clip_set()
-        parts = read_avoidance(actions, clips) if avoidance and actions else avoidance
-        if level == "frames":
-            given = _given(event=event, per_second=per_second, bound=bound)
-            library = build_library(clips, **given, avoidance=parts, progress=stages)
-        elif level == "avoidance":
-            given = _given(every=every, offered=offered, bound=bound)
-            library = build_avoidance_library(clips, parts, **given, progress=stages)
-        elif level == "preparation":
-            given = _given(alike=alike, threshold=threshold, bound=bound)
-            library = _preparation(clips, actions, _given(most=most), given, stages)
-        else:
-            mine = None if actions is None else read_actions(actions, clips)
-            given = _given(alike=alike, most_ways=most_ways, bound=bound)
-            library = build_action_library(clips, mine, **given, avoidance=parts, progress=stages)
+        if actions is not None:
+            _take_from_file(actions, clips, wanted, options)
+        library = build_library(
+            clips,
+            layers=wanted if layer else None,
+            bound=bound,
+            progress=stages,
+            **options,
+        )
     save_library(output, library)
     if as_json:
         print_json({**library_values(library), "output": str(output)})
@@ -276,51 +268,65 @@ def build(
     for line in (*library_lines(library), wrote):
         out.print(line, markup=False, highlight=False)
     out.print(worth_table(library))
-    mean = library.report["mean_action_s"]
-    if level == "frames" and mean < SHORTEST_ACTION:
+    frames = library.layers.get("frames")
+    mean = SHORTEST_ACTION if frames is None else frames.report["mean_action_s"]
+    if mean < SHORTEST_ACTION:
         err.print(
-            f"warning: actions last {mean:.2f} s on average; fighters look one "
+            f"warning: actions of the layer frames last {mean:.2f} s on average; fighters look one "
             "action ahead and will dither: join at a foot's lift-off (--event left, right or both)",
             markup=False,
             highlight=False,
         )
 
 
-def _preparation(
-    clips: Any, actions: Path | None, finding: dict[str, Any], given: dict[str, Any], stages: Stages
-) -> Any:
-    """The library for preparation of these clips: targets as a file marks them, or as found."""
-    from kumite.annotate import find_contacts, find_strikes, read_marked
-    from kumite.graph import build_preparation_library, find_targets, marked_targets
+def _take_from_file(
+    path: Path, clips: Any, wanted: tuple[str, ...], options: dict[str, dict[str, Any]]
+) -> None:
+    """Options of layers that a file of actions gives. Errors: what it says; nothing in it is for
+    the one layer that is wanted."""
+    from kumite.annotate import find_contacts, read_actions, read_avoidance, read_marked
+    from kumite.graph import marked_targets
 
-    marked = None if actions is None else read_marked(actions, clips)
-    stages("finding contacts and effective hits")
-    contacts, strikes = find_contacts(clips), find_strikes(clips)
-    stages("finding target motions")
-    if marked is None:
-        targets, cycles = find_targets(clips, contacts, strikes, **finding)
-    else:
-        targets, cycles = marked_targets(clips, contacts, marked)
-    return build_preparation_library(
-        clips,
-        targets,
-        cycles,
-        **given,
-        keep_all=marked is not None,
-        contacts=contacts,
-        strikes=strikes,
-        progress=stages,
-    )
+    if "actions" in wanted:
+        options.setdefault("actions", {})["actions"] = read_actions(path, clips)
+    parts = read_avoidance(path, clips)
+    for name in ("frames", "actions"):
+        if "avoidance" in options.get(name, {}):
+            options[name]["avoidance"] = parts
+    if "avoidance" in wanted and (len(parts) or len(wanted) == 1):
+        options.setdefault("avoidance", {})["avoidance"] = parts
+    if "preparation" in wanted:
+        try:
+            marked = read_marked(path, clips)
+        except KumiteError:
+            if len(wanted) == 1:
+                raise
+            return  # no line marks one: they are found
+        targets, cycles = marked_targets(clips, find_contacts(clips), marked)
+        options.setdefault("preparation", {}).update(targets=targets, cycles=cycles, keep_all=True)
 
 
-def _refuse_of_another_level(level: str, options: dict[str, dict[str, Any]]) -> None:
-    """Errors: an unknown level; an option that was given and says nothing about this one."""
-    if level not in options:
-        raise unknown("level", level, options)
-    for other, given in options.items():
-        for name, value in given.items():
-            if other != level and value is not None:
-                raise KumiteError(f"{name}: of --level {other}; expected none with --level {level}")
+def _options_of_layers(
+    wanted: tuple[str, ...], given: dict[str, tuple[Any, str, tuple[str, ...]]]
+) -> dict[str, dict[str, Any]]:
+    """Options by the layer whose builder takes them.
+
+    given: by name on the command line, the value, its name to the builder, and the layers it is of.
+    Errors: an option that says nothing about any layer that is wanted.
+    """
+    options: dict[str, dict[str, Any]] = {}
+    for option, (value, name, layers) in given.items():
+        if value is None:
+            continue
+        of = [layer for layer in layers if layer in wanted]
+        if not of:
+            raise KumiteError(
+                f"{option}: of --layer {' or '.join(layers)}; expected none with "
+                f"--layer {', '.join(wanted)}"
+            )
+        for layer in of:
+            options.setdefault(layer, {})[name] = value
+    return options
 
 
 def _given(**options: Any) -> dict[str, Any]:

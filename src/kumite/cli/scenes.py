@@ -89,7 +89,7 @@ def live_scene(wanted: Wanted) -> Any:
 def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
     """A scene ready to run: library read or performed, policies trained or found."""
     from kumite.control import cache_folder
-    from kumite.graph import builtin_library, load_library
+    from kumite.graph import builtin_layer, load_library
     from kumite.scene import BoutScene, DodgeScene, EvasionScene, LiveScene, PrepareScene
     from kumite.scene.needs import needs
     from kumite.warm import warm
@@ -102,14 +102,12 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
             stages("reading the library")
             found = load_library(library)
         else:
-            found = builtin_library(cache, progress=stages, style=needed.style, level=needed.level)
+            found = builtin_layer(cache, progress=stages, style=needed.style, level=needed.level)
         if needed.attackers is not None:
             if is_library(needed.attackers):
                 attack = load_library(needed.attackers)
             else:
-                attack = builtin_library(
-                    cache_folder(None), progress=stages, style=needed.attackers
-                )
+                attack = builtin_layer(cache_folder(None), progress=stages, style=needed.attackers)
             stages("preparing the scene")
             training = Training(bars)
             return EvasionScene(settings, found, attack, seed=seed, cache=cache, progress=training)
@@ -391,13 +389,7 @@ def _stage(
     for name, value in (("--library", library), ("--count", count), ("--throws", throws)):
         if value is not None:
             raise KumiteError(f"{name}: of a scene; {scene} is a library, whose actions are played")
-    found = load_library(scene)
-    if not found.actions:
-        raise KumiteError(
-            f"{scene}: a library of frames, without actions; expected one built with "
-            "'kumite build --level actions' (or a scene, and this library as --library)"
-        )
-    return ActionPlayback(found)
+    return ActionPlayback(load_library(scene).layer("actions"))
 
 
 @app.command()

@@ -17,7 +17,7 @@ def train(
     library: Annotated[
         Path | None,
         typer.Argument(
-            help="A library built with 'kumite build --level preparation' (default: built-in)."
+            help="A library built with 'kumite build --layer preparation' (default: built-in)."
         ),
     ] = None,
     steer: Annotated[
@@ -50,7 +50,7 @@ def train(
     from kumite.control import PreparationSettings, cache_folder, gradual
     from kumite.control.approaching import STEER, trained_approach
     from kumite.files import refuse_unwritable
-    from kumite.graph import builtin_library, load_library
+    from kumite.graph import builtin_layer, load_library
 
     if plot is not None:
         refuse_unwritable(plot)  # before the work, not after
@@ -61,10 +61,10 @@ def train(
     with progress() as bars:
         stages = Stages(bars)
         if library is None:
-            found = builtin_library(folder, stages, style="targets", level="preparation")
+            found = builtin_layer(folder, stages, style="targets", level="preparation")
         else:
             stages("reading the library")
-            found = load_library(library)
+            found = load_library(library).layer("preparation")
         stages("learning")
 
         def told(batch: int, changed: float) -> None:

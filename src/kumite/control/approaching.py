@@ -23,7 +23,7 @@ from kumite.control.preparation import (
     trained_preparation,
 )
 from kumite.errors import KumiteError, unknown
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.synthesis import level_displacements
 from kumite.synthesis.preparation import LEGS
 
@@ -53,7 +53,7 @@ class Approach:
 
 
 def approach_motions(
-    library: Library,
+    library: Layer,
     settings: PreparationSettings | None = None,
     steer: Sequence[float] = STEER,
     *,
@@ -74,7 +74,7 @@ def approach_motions(
     if preparing is None:
         raise KumiteError(
             "the library holds no target motions; expected one for preparation "
-            "(kumite build --level preparation)"
+            "(kumite build --layer preparation)"
         )
     turns = np.asarray(steer, dtype=float).reshape(-1)
     if not (len(turns) and np.all(np.abs(turns) <= STEEREST)):
@@ -113,7 +113,7 @@ def _name(label: str, core: int, shared: bool, steer: float) -> str:
 
 
 def trained_approach(
-    library: Library,
+    library: Layer,
     folder: Path | str | None,
     settings: PreparationSettings | None = None,
     *,

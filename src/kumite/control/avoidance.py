@@ -25,7 +25,7 @@ from kumite.control.attack import Attack, packed
 from kumite.control.rules import AvoidanceRules
 from kumite.control.volumes import joins_of, volumes_of
 from kumite.errors import KumiteError, unknown
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.kernels import avoid as kernels
 from kumite.kernels import cells, paths
 from kumite.kernels.joins import PLACES
@@ -73,7 +73,7 @@ class Plan:
     when: np.ndarray  # [n] … and the s at which they show
 
     def frames(self, now: float) -> float:
-        """Library frames that have gone by at a time; 1 a frame once it is over."""
+        """Layer frames that have gone by at a time; 1 a frame once it is over."""
         return float(np.interp(now - self.begins, self.when, self.at))
 
     @property
@@ -128,13 +128,13 @@ class AvoidanceSearch:
 
     def __init__(
         self,
-        library: Library,
+        library: Layer,
         settings: AvoidanceRules | None = None,
         *,
         spheres: Spheres | None = None,
     ) -> None:
         """spheres: the body's volume; by default laid to cover it. Errors: no part to use."""
-        instance(library, Library, "AvoidanceSearch")
+        instance(library, Layer, "AvoidanceSearch")
         self.library, self.settings = library, settings or AvoidanceRules()
         clips = library.clips
         self.spheres = spheres or lay_spheres(clips.skeleton)
@@ -361,7 +361,7 @@ def _now(standing: Standing) -> kernels.Now:
     )
 
 
-def fastest_end_effector(library: Library) -> np.ndarray:
+def fastest_end_effector(library: Layer) -> np.ndarray:
     """The largest speed [L] m/s of hands and feet in each stretch."""
     clips, table = library.clips, library.table
     position, _ = clips.world

@@ -47,7 +47,7 @@ from kumite.brief import brief
 from kumite.checks import freeze
 from kumite.clip import LIMBS, ClipSet, tip_positions
 from kumite.errors import KumiteError, unknown
-from kumite.graph import Library
+from kumite.graph import Layer
 
 POSITIONS = ("head", "upper torso", "lower torso")
 HIT_DIRECTIONS = ("front", "horizontal", "upwards")
@@ -103,7 +103,7 @@ def suitability(defences: Annotations, attacks: Annotations) -> np.ndarray:
 # From the motion ---------------------------------------------------------------------------------
 
 
-def annotate_actions(library: Library, actions: Actions) -> Annotations:
+def annotate_actions(library: Layer, actions: Actions) -> Annotations:
     """What each action [A] of a library's clips hits or protects, told from its motion.
 
     Errors: actions of other clips; a role that is missing.
@@ -167,7 +167,7 @@ class _Body:
 
 
 def _blows(
-    body: _Body, library: Library, ways: Sequence[str], actions: Actions, k: int
+    body: _Body, library: Layer, ways: Sequence[str], actions: Actions, k: int
 ) -> list[tuple[int, np.ndarray, str]]:
     """Limb, frames and way of each blow of an attack; its fastest moment if none was found."""
     strikes = library.strikes
@@ -384,7 +384,7 @@ class CombinationTable:
 
 
 def build_table(
-    library: Library, actions: Actions, annotations: Annotations | None = None
+    library: Layer, actions: Actions, annotations: Annotations | None = None
 ) -> CombinationTable:
     """All attacks paired with all defences of a library's actions.
 

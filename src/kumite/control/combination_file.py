@@ -44,7 +44,7 @@ from kumite.control.combination import (
     build_table,
 )
 from kumite.errors import KumiteError, at
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.mocap import text
 
 OURS = "#:"  # begins a comment of ours, which is written anew each time
@@ -89,7 +89,7 @@ class _File(_Model):
 # Reading -----------------------------------------------------------------------------------------
 
 
-def read_table(path: Path | str, library: Library, actions: Actions) -> CombinationTable:
+def read_table(path: Path | str, library: Layer, actions: Actions) -> CombinationTable:
     """The table that a file gives a library's actions; what it does not say, their motion does.
 
     Errors: no such file, not TOML; unknown keys, words and actions, each with its line and near

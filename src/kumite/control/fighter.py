@@ -11,7 +11,7 @@ import numpy as np
 from kumite.brief import brief
 from kumite.control.policy import Policy, Tracks, frame_discount, reward_params
 from kumite.control.rules import Temper
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.kernels import crowd as kernels
 from kumite.kernels import policy as kernels_policy
 from kumite.kernels.blow import NOBODY
@@ -25,7 +25,7 @@ IN_STEP = 0.2  # s: of two who face each other none begins what the other began 
 class Skill:
     """What all fighters of one library share: policies and the tracks of its actions."""
 
-    library: Library
+    library: Layer
     approach: Policy
     strike: Policy
     tracks: Tracks

@@ -19,7 +19,7 @@ from kumite.control.combination import build_table
 from kumite.control.rules import Player, Rules
 from kumite.control.styles import VULNERABILITY, short_range
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.kernels import game as fight
 from kumite.kernels import moves as kernels
 from kumite.kernels import prune
@@ -94,7 +94,7 @@ class GameTree:
     """The game that a library of whole actions is, and the search of it."""
 
     def __init__(
-        self, library: Library, rules: Rules | None = None, suits: np.ndarray | None = None
+        self, library: Layer, rules: Rules | None = None, suits: np.ndarray | None = None
     ) -> None:
         """suits [A, A]: S of the library's actions against each other, by default as
         :func:`build_table` finds it. Errors: the graph is not one of whole actions.
@@ -331,14 +331,14 @@ class GameTree:
         )
 
 
-def _ranks(library: Library) -> np.ndarray:
+def _ranks(library: Layer) -> np.ndarray:
     """The place in time [X] of each blow of a library."""
     out = np.empty(len(library.strikes), dtype=np.int64)
     out[np.argsort(library.strikes.frame, kind="stable")] = np.arange(len(out))
     return out
 
 
-def _moves(library: Library) -> kernels.Moves:
+def _moves(library: Layer) -> kernels.Moves:
     """The stretches as the kernels take them."""
     table, clips = library.table, library.clips
     body = lay_body(clips.skeleton)

@@ -18,7 +18,7 @@ import numpy as np
 from kumite.control.approaching import STEEREST, Approach, trained_approach
 from kumite.control.preparation import PreparationPolicy, PreparationSettings, gradual
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.graph.hierarchy import ways_into_cores
 from kumite.rotation import wrap_angle
 
@@ -30,7 +30,7 @@ ASIDE = 0.6  # of the distance to the place: so far behind it lies what is steer
 class Guide:
     """A policy and the library whose motions it chooses."""
 
-    library: Library
+    library: Layer
     approach: Approach
     policies: tuple[PreparationPolicy, ...]  # one for each C of the root
     policy_of: np.ndarray  # [T] int64, the policy that prepares for a target motion
@@ -39,7 +39,7 @@ class Guide:
         if self.library.preparing is None:
             raise KumiteError(
                 "the library is not one for preparation; expected one built with "
-                "'kumite build --level preparation'"
+                "'kumite build --layer preparation'"
             )
         if any(len(p.class_after) != len(self.approach.core) for p in self.policies):
             raise KumiteError("guide: a policy is of other motions")
@@ -92,7 +92,7 @@ class Guide:
 
 
 def learned_guide(
-    library: Library,
+    library: Layer,
     folder: Path | str | None,
     curve: np.ndarray,
     *,

@@ -21,7 +21,7 @@ from kumite.checks import freeze, instance, number, whole
 from kumite.clip import LIMBS
 from kumite.control.grid import TargetGrid, approach_grid, heading_grid, strike_grid
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.kernels import policy as kernels
 from kumite.rotation import planar_apply, planar_compose, planar_inverse
 
@@ -42,7 +42,7 @@ class Tracks:
     tip_start: np.ndarray  # [L + 1]
 
 
-def stretch_tracks(library: Library, limbs: tuple[str, ...] = LIMBS) -> Tracks:
+def stretch_tracks(library: Layer, limbs: tuple[str, ...] = LIMBS) -> Tracks:
     """Tracks of every stretch; ``limbs`` are those whose hits count."""
     table, strikes, facing = library.table, library.strikes, library.clips.facing
     use = [LIMBS.index(limb) for limb in limbs]
@@ -148,7 +148,7 @@ def take_place(distance: float = 0.0) -> Behaviour:
     return Behaviour("take_place", heading_grid(), station=station)
 
 
-BEHAVIOURS: dict[str, Callable[[Library], Behaviour]] = {
+BEHAVIOURS: dict[str, Callable[[Layer], Behaviour]] = {
     "approach": lambda library: approach(),
     "strike": lambda library: strike(library),
     "keep_off": lambda library: keep_off(),
@@ -164,13 +164,13 @@ def approach(**changes) -> Behaviour:
     return Behaviour("approach", approach_grid(), **changes)
 
 
-def strike(library: Library, **changes) -> Behaviour:
+def strike(library: Layer, **changes) -> Behaviour:
     """Hit the target, fast (A6, A7). The grid is the bounding volume of the library's hits.
 
     It counts only while the target is in reach, :attr:`Behaviour.farthest`: no farther off than an
     action of the library strikes, or ends where the next one may. Beyond, it is worth nothing.
     """
-    instance(library, Library, "strike")
+    instance(library, Layer, "strike")
     changes.setdefault("grid", strike_grid(library.strikes.points))
     found = Behaviour("strike", **changes)
     if "farthest" in changes:
@@ -266,7 +266,7 @@ def stretch_rewards(behaviour: Behaviour, tracks: Tracks, fps: float) -> np.ndar
 
 
 def solve(
-    library: Library,
+    library: Layer,
     behaviour: Behaviour,
     *,
     residual: float = 1e-4,
@@ -276,7 +276,7 @@ def solve(
     """Value iteration by full sweeps until a sweep changes no value by more than ``residual`` times
     the largest value. ``converged`` says whether it got there within ``most_sweeps``.
     """
-    instance(library, Library, "solve")
+    instance(library, Layer, "solve")
     begin = time.perf_counter()
     table = library.table
     tracks = stretch_tracks(library, behaviour.limbs)

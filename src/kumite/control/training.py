@@ -12,7 +12,7 @@ from pathlib import Path
 from kumite import files
 from kumite.control.policy import Behaviour, Policy, solve
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Layer
 
 KIND = "policy"
 VERSION = 1
@@ -20,7 +20,7 @@ RESIDUAL = 1e-4
 
 
 def trained(
-    library: Library,
+    library: Layer,
     behaviour: Behaviour,
     folder: Path | str | None,
     *,

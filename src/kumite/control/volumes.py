@@ -6,7 +6,7 @@ import numpy as np
 
 from kumite.body import Spheres
 from kumite.clip import SIDES, ClipSet, Skeleton
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.kernels.avoid import Volumes
 from kumite.kernels.character import LN2
 from kumite.kernels.joins import ANKLE, KNEE, ROOT, Joins
@@ -60,7 +60,7 @@ def hung(skeleton: Skeleton, spheres: Spheres) -> tuple[np.ndarray, np.ndarray]:
     return between, along
 
 
-def joins_of(library: Library, reckoned: bool) -> Joins:
+def joins_of(library: Layer, reckoned: bool) -> Joins:
     """What of a library the offsets come from that joins leave. reckoned: whether they count."""
     clips, skeleton = library.clips, library.clips.skeleton
     position, _ = clips.world

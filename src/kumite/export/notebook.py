@@ -13,14 +13,14 @@ from PIL import Image
 from kumite.clip import Clip, ClipSet
 from kumite.export.moment_sheet import moment_image
 from kumite.export.moments import Moment, moments
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.scene.recording import Recording
 
 CELLS = 6
 SIZE = (130, 150)  # pixels of a cell
 
 
-def html(value: Clip | ClipSet | Library | Recording) -> str:
+def html(value: Clip | ClipSet | Layer | Recording) -> str:
     """A strip of six cells as an inline PNG, and what ``repr`` says below it."""
     with io.BytesIO() as file:
         Image.fromarray(strip(value)).save(file, format="PNG")
@@ -31,7 +31,7 @@ def html(value: Clip | ClipSet | Library | Recording) -> str:
     )
 
 
-def strip(value: Clip | ClipSet | Library | Recording) -> np.ndarray:
+def strip(value: Clip | ClipSet | Layer | Recording) -> np.ndarray:
     """The picture [H, W, 3] uint8: of motion frames at even distances, of a set of clips the middle
     of some, of a recording what happened in it.
     """
@@ -43,7 +43,7 @@ def strip(value: Clip | ClipSet | Library | Recording) -> np.ndarray:
     if isinstance(value, Clip):
         frames = np.linspace(0, len(value) - 1, CELLS).round().astype(int)
         return _of_frames(value, frames, value.name)
-    clips = value.clips if isinstance(value, Library) else value
+    clips = value.clips if isinstance(value, Layer) else value
     some = np.unique(np.linspace(0, len(clips.names) - 1, CELLS).round().astype(int))
     if len(some) == 1:
         return strip(clips.clip(0))

@@ -1,10 +1,17 @@
 """The motion graph: pose distance, transitions, components, the action table, the library file."""
 
-from kumite.graph.assess import Assessment, JoinQuality, Spread, Verdict, assess
-from kumite.graph.avoiding import build_avoidance_library, find_avoiding_transitions
-from kumite.graph.builtin import builtin_library
+from kumite.graph.assess import (
+    Assessment,
+    JoinQuality,
+    Spread,
+    Verdict,
+    assess,
+    assess_library,
+)
+from kumite.graph.avoiding import build_avoidance, find_avoiding_transitions
+from kumite.graph.builtin import builtin_layer, builtin_library
 from kumite.graph.distance import PoseFeatures, pose_features
-from kumite.graph.errands import build_preparation_library
+from kumite.graph.errands import build_preparation
 from kumite.graph.finding import find_targets, marked_targets
 from kumite.graph.hierarchy import (
     Hierarchy,
@@ -14,13 +21,16 @@ from kumite.graph.hierarchy import (
     hierarchy_table,
 )
 from kumite.graph.joins import JoinBound, JoinMeter, Jumps
-from kumite.graph.library import Library, build_library, load_library, save_library
+from kumite.graph.layer import Layer, build_frames
+from kumite.graph.library import LAYERS, Library, build_library
+from kumite.graph.library_file import load_library, save_library
 from kumite.graph.preparing import Preparing
 from kumite.graph.table import ActionTable, fold
 from kumite.graph.transitions import Transitions, find_transitions, strongest_component
-from kumite.graph.whole import build_action_library
+from kumite.graph.whole import build_actions
 
 __all__ = [
+    "LAYERS",
     "ActionTable",
     "Assessment",
     "Hierarchy",
@@ -28,6 +38,7 @@ __all__ = [
     "JoinMeter",
     "JoinQuality",
     "Jumps",
+    "Layer",
     "Library",
     "PoseFeatures",
     "Preparing",
@@ -36,12 +47,15 @@ __all__ = [
     "Transitions",
     "Verdict",
     "assess",
+    "assess_library",
     "authored_targets",
-    "build_action_library",
-    "build_avoidance_library",
+    "build_actions",
+    "build_avoidance",
+    "build_frames",
     "build_hierarchy",
     "build_library",
-    "build_preparation_library",
+    "build_preparation",
+    "builtin_layer",
     "builtin_library",
     "find_avoiding_transitions",
     "find_targets",

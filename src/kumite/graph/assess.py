@@ -11,6 +11,7 @@ import numpy as np
 
 from kumite.annotate import KINDS
 from kumite.graph.joins import JoinMeter
+from kumite.graph.layer import Layer
 from kumite.graph.library import Library
 from kumite.graph.preparing import KINDS as ABOUT
 from kumite.graph.preparing import own_blows
@@ -86,7 +87,7 @@ class Assessment:
         return {v.kind: v for v in self.scenes}[kind]
 
     def rows(self) -> list[tuple[str, str]]:
-        """The assessment as a table of labels and texts."""
+        """The assessment as a table of labels and texts, without the verdicts."""
         j = self.joins
         why = ", ".join(f"{share:.0%} {reason}" for reason, share in self.left_out.items())
         rows = [
@@ -106,7 +107,7 @@ class Assessment:
                     ("pelvis velocity (m/s)", j.speed, 2),
                 )
             ]  # fmt: skip
-        return rows + [(v.kind, str(v)) for v in self.scenes]
+        return rows
 
     def to_json(self) -> dict[str, Any]:
         """The assessment as plain values."""
@@ -121,7 +122,7 @@ class Assessment:
         return plain(asdict(self))
 
 
-def assess(library: Library) -> Assessment:
+def assess(library: Layer) -> Assessment:
     """What a library is worth: see :class:`Assessment`."""
     clips, table, report = library.clips, library.table, library.report
     kept = np.zeros(len(clips), dtype=bool)
@@ -158,7 +159,33 @@ def assess(library: Library) -> Assessment:
     )
 
 
-def _join_quality(library: Library, source: np.ndarray, target: np.ndarray) -> JoinQuality:
+SERVES = {
+    "fight by policy": "frames",
+    "fight by tree": "actions",
+    "avoid": "avoidance",
+    "prepare": "preparation",
+}
+"""The layer that a kind of scene runs on."""
+
+
+def assess_library(library: Library) -> tuple[dict[str, Assessment], tuple[Verdict, ...]]:
+    """What each layer of a library is worth, and what the whole is good for: of each kind of scene
+    the verdict on the layer that it runs on."""
+    found = {name: assess(layer) for name, layer in library.layers.items()}
+    verdicts = []
+    for kind, name in SERVES.items():
+        if name in found:
+            verdicts.append(found[name].verdict(kind))
+        else:
+            why = library.missing.get(name, "")
+            advice = "" if why else f"--layer {name}"
+            verdicts.append(
+                Verdict(kind, WILL_NOT, why or f"the layer {name!r} was not built", advice)
+            )
+    return found, tuple(verdicts)
+
+
+def _join_quality(library: Layer, source: np.ndarray, target: np.ndarray) -> JoinQuality:
     meter = JoinMeter(library.clips)
     jumps, own = meter.joins(source, target), meter.own()
 
@@ -184,7 +211,7 @@ def _verdict(
     return Verdict(kind, WILL_WORK, "", "")
 
 
-def _policy_fight(library: Library, blows: int, kept: np.ndarray) -> Verdict:
+def _policy_fight(library: Layer, blows: int, kept: np.ndarray) -> Verdict:
     table, clips = library.table, library.clips
     ways, lasts = table.actions / table.states, float(table.duration[table.stretch].mean())
     found = len(library.strikes)
@@ -204,7 +231,7 @@ def _policy_fight(library: Library, blows: int, kept: np.ndarray) -> Verdict:
             (
                 library.preparing is not None,
                 "its graph is one of walks and what they lead to",
-                "--level frames",
+                "--layer frames",
             ),
             (found == 0, "no blow is in the clips", "clips with punches or kicks"),
             (
@@ -244,10 +271,10 @@ def _policy_fight(library: Library, blows: int, kept: np.ndarray) -> Verdict:
     )
 
 
-def _tree_fight(library: Library) -> Verdict:
+def _tree_fight(library: Layer) -> Verdict:
     if library.actions is None:
         return Verdict(
-            "fight by tree", WILL_NOT, "its graph is not one of whole actions", "--level actions"
+            "fight by tree", WILL_NOT, "its graph is not one of whole actions", "--layer actions"
         )
     # What some state offers: reactions are offered by none.
     offered = np.unique(library.table.stretch)
@@ -281,7 +308,7 @@ def _tree_fight(library: Library) -> Verdict:
     )
 
 
-def _avoids(library: Library) -> Verdict:
+def _avoids(library: Layer) -> Verdict:
     held = len(np.unique(library.parts_of_stretch[1]))
     found, level = len(library.avoidance), library.report.get("level", "frames")
     soon = ways_out_soon(library) if held else 0.0
@@ -291,7 +318,7 @@ def _avoids(library: Library) -> Verdict:
             (
                 found == 0 and level != "avoidance",
                 "its graph keeps no avoidance whole",
-                "--level avoidance",
+                "--layer avoidance",
             ),
             (
                 held == 0,
@@ -303,7 +330,7 @@ def _avoids(library: Library) -> Verdict:
             (
                 level != "avoidance" and soon < FEW_WAYS,
                 f"on average {soon:.1f} avoidances can be under way within {SOON:g} s",
-                "--level avoidance",
+                "the layer avoidance",
             ),
             (
                 soon < FEW_WAYS,
@@ -315,7 +342,7 @@ def _avoids(library: Library) -> Verdict:
     )
 
 
-def ways_out_soon(library: Library) -> float:
+def ways_out_soon(library: Layer) -> float:
     """How many avoidance parts are at their middle within SOON of a state, on average over time."""
     table = library.table
     begin, part = library.parts_of_stretch
@@ -333,13 +360,13 @@ def ways_out_soon(library: Library) -> float:
     return float(np.average(ways, weights=time)) if time.sum() else 0.0
 
 
-def _prepares(library: Library) -> Verdict:
+def _prepares(library: Layer) -> Verdict:
     if library.preparing is None:
         return Verdict(
             "prepare",
             WILL_NOT,
             "its graph is not one of walks and what they lead to",
-            "--level preparation",
+            "--layer preparation",
         )
     h = library.preparing.hierarchy
     kinds = sorted({ABOUT[k] for k in library.preparing.kind.tolist()})

@@ -13,13 +13,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from kumite.annotate import AvoidanceParts, Strikes, find_contacts, find_strikes
+from kumite.annotate import AvoidanceParts, Contacts, Strikes
 from kumite.checks import instance
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError
 from kumite.graph.distance import PoseFeatures, pose_features, squared_distances
 from kumite.graph.joins import JoinBound
-from kumite.graph.library import Library, chosen_parts, folded, with_parts
+from kumite.graph.layer import Layer, chosen_parts, folded, noted, with_parts
 from kumite.graph.transitions import Transitions
 from kumite.rotation import planar_apply, planar_compose, planar_inverse
 
@@ -40,7 +40,7 @@ SAME_PLACE = 0.10  # m: blows that land nearer to each other than that are alike
 ROLES = ("head", "chest", "pelvis", "left_hand", "right_hand", "left_foot", "right_foot")
 
 
-def build_avoidance_library(
+def build_avoidance(
     clips: ClipSet,
     avoidance: AvoidanceParts | bool = True,
     *,
@@ -49,21 +49,30 @@ def build_avoidance_library(
     worst: float = WORST,
     blows: bool = False,
     bound: JoinBound | None = None,
+    contacts: Contacts | None = None,
+    strikes: Strikes | None = None,
+    without: np.ndarray | None = None,
     progress: Callable[[str], None] = lambda stage: None,
-) -> Library:
-    """A library whose graph is made of :func:`find_avoiding_transitions`.
+) -> Layer:
+    """The layer ``avoidance``, made of :func:`find_avoiding_transitions`.
 
-    avoidance: its parts; True: as they are found. blows: whether some are offered after each.
-    bound: the farthest that a join may jump; None: the usual (:class:`JoinBound`).
+    contacts, strikes: of these clips, if they are known. without [F] bool: frames that are not
+    to be in it. avoidance: its parts; True: as they are found. blows: whether some are offered
+    after each. bound: the farthest that a join may jump; None: the usual (:class:`JoinBound`).
     Errors: there are no parts.
     """
-    instance(clips, ClipSet, "build_avoidance_library")
-    progress("finding contacts and effective hits")
-    contacts, strikes = find_contacts(clips), find_strikes(clips)
+    instance(clips, ClipSet, "build_avoidance")
+    contacts, strikes = noted(clips, contacts, strikes, progress)
     parts = chosen_parts(clips, contacts, avoidance, progress)
     progress("comparing poses")
     transitions = find_avoiding_transitions(
-        clips, parts, every=every, offered=offered, worst=worst, strikes=strikes if blows else None
+        clips,
+        parts,
+        every=every,
+        offered=offered,
+        worst=worst,
+        strikes=strikes if blows else None,
+        without=without,
     )
     progress("folding the graph")
     told = {"level": "avoidance", "every": every, "offered": offered, "worst": worst}
@@ -81,12 +90,13 @@ def find_avoiding_transitions(
     worst: float = WORST,
     features: PoseFeatures | None = None,
     strikes: Strikes | None = None,
+    without: np.ndarray | None = None,
 ) -> Transitions:
     """Transitions into avoidances from everywhere, and between captures now and then.
 
     every [s], offered: how often and how many; worst [rad]: see above. No transition leaves or
-    enters within a part. strikes: blows to strike back with, which are offered just after each
-    part. Errors: no parts, numbers out of range.
+    enters within a part, or a frame of ``without`` [F] bool. strikes: blows to strike back with,
+    which are offered just after each part. Errors: no parts, numbers out of range.
     """
     if len(parts) == 0:
         raise KumiteError("no avoidance parts; expected clips in which somebody avoids something")
@@ -110,9 +120,14 @@ def find_avoiding_transitions(
             f"each of {len(parts)} avoidance part(s) begins with its clip: no frame leads into "
             "one; expected clips that begin before someone avoids something"
         )
+    if without is not None:
+        usable = ~without[entry]
+        entry, part_of_entry = entry[usable], part_of_entry[usable]
     begun = inside.copy()
     begun[entry[entry < parts.start[part_of_entry]]] = True
     may_leave = ~begun & (since > 0)
+    if without is not None:
+        may_leave &= ~without
     if strikes is not None:  # and whoever has begun to strike
         for start, stop in zip(strikes.start.tolist(), strikes.stop.tolist()):
             first = clips.clip_start[clip[start]]

@@ -11,10 +11,8 @@ from kumite.annotate import (
     Contacts,
     Cycles,
     Strikes,
-    find_contacts,
     find_cycles,
     find_reference,
-    find_strikes,
 )
 from kumite.annotate.balance import find_balance
 from kumite.annotate.reference import LEGS
@@ -22,6 +20,7 @@ from kumite.body import lay_body
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError
 from kumite.graph.distance import pose_features
+from kumite.graph.finding import MOST, find_targets
 from kumite.graph.hierarchy import (
     ALIKE,
     Hierarchy,
@@ -31,15 +30,16 @@ from kumite.graph.hierarchy import (
     hierarchy_table,
 )
 from kumite.graph.joins import JoinBound, JoinMeter
-from kumite.graph.library import Library, counted
+from kumite.graph.layer import Layer, counted, noted
 from kumite.graph.preparing import Preparing, find_about, own_blows
 
 
-def build_preparation_library(
+def build_preparation(
     clips: ClipSet,
-    targets: Targets,
+    targets: Targets | None = None,
     cycles: Cycles | None = None,
     *,
+    most: int = MOST,
     alike: float = ALIKE,
     threshold: float = LEGS,
     bound: JoinBound | None = None,
@@ -47,17 +47,22 @@ def build_preparation_library(
     contacts: Contacts | None = None,
     strikes: Strikes | None = None,
     progress: Callable[[str], None] = lambda stage: None,
-) -> Library:
-    """The hierarchical graph of these clips (Shum et al. 2013, section 4), as a library.
+) -> Layer:
+    """The layer ``preparation``: the hierarchical graph of clips (Shum et al. 2013, section 4).
 
-    cycles: the cores; None: as they are found outside of the targets. alike [rad], threshold
-    [rad²]: see :func:`build_hierarchy` and :func:`find_reference`. A target is entered up to its
-    reference posture, and left from where what it is about is over. bound: the farthest that a join
-    may jump; None: the usual (:class:`JoinBound`): a target whose best way in or out jumps farther
-    is left out, unless ``keep_all`` (for targets that a person has marked). contacts, strikes: of
-    these clips, if they are known. Errors: no targets, no cycles; frames that are no part of one
-    clip; limits out of range.
+    targets: None: as they are found (:func:`find_targets`), at most ``most`` of a name, and the
+    cycles with them. cycles: the cores; None: as they are found outside of the targets. alike
+    [rad], threshold [rad²]: see :func:`build_hierarchy` and :func:`find_reference`. A target is
+    entered up to its reference posture, and left from where what it is about is over. bound: the
+    farthest that a join may jump; None: the usual (:class:`JoinBound`): a target whose
+    best way in or out jumps farther is left out, unless ``keep_all`` (for targets that a person has
+    marked). contacts, strikes: of these clips, if they are known. Errors: no targets, no cycles;
+    frames that are no part of one clip; limits out of range.
     """
+    contacts, strikes = noted(clips, contacts, strikes, progress)
+    if targets is None:
+        progress("finding target motions")
+        targets, cycles = find_targets(clips, contacts, strikes, most=most)
     if len(targets) == 0:
         raise KumiteError("no target motion; expected at least one to prepare for")
     if not 0 < alike < np.inf:
@@ -65,9 +70,6 @@ def build_preparation_library(
     if not 0 < threshold < np.inf:
         raise KumiteError(f"threshold {threshold} rad²; expected more than 0")
     check_targets(clips, targets)
-    progress("finding contacts and effective hits")
-    contacts = find_contacts(clips) if contacts is None else contacts
-    strikes = find_strikes(clips) if strikes is None else strikes
     progress("finding cycles of locomotion")
     if cycles is None:
         cycles = find_cycles(clips, contacts, where=outside(clips, targets))
@@ -142,7 +144,7 @@ def build_preparation_library(
         "fall_back": [targets.label[t] for t in range(count) if not references[t].found],
         **counted(clips, table, strikes, played),
     }
-    return Library(clips, contacts, strikes, table, report, preparing=preparing)
+    return Layer(clips, contacts, strikes, table, report, preparing=preparing)
 
 
 def _fits(clips: ClipSet, hierarchy: Hierarchy, bound: JoinBound) -> np.ndarray:

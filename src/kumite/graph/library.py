@@ -1,386 +1,147 @@
-"""A library: clips, their notes and the action table, as one file."""
+"""A library: clips with several motion graphs, its layers, over one frame index."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from kumite import files
-from kumite.annotate import (
-    Actions,
-    AvoidanceParts,
-    Contacts,
-    Cycles,
-    Strikes,
-    find_avoidance,
-    find_contacts,
-    find_strikes,
-    no_avoidance,
-)
+from kumite.annotate import Contacts, find_contacts, find_strikes
 from kumite.brief import brief, pictured
-from kumite.checks import instance, mapping, number, text, whole
-from kumite.clip import ClipSet, Skeleton
-from kumite.errors import KumiteError
-from kumite.graph.distance import pose_features
-from kumite.graph.hierarchy import Hierarchy, Targets
-from kumite.graph.joins import JoinBound, bounded
-from kumite.graph.preparing import Preparing
-from kumite.graph.table import ActionTable, fold
-from kumite.graph.transitions import (
-    LARGEST_SHARE,
-    PER_SECOND,
-    Transitions,
-    find_transitions,
-    strongest_component,
-)
+from kumite.checks import freeze_mapping, instance
+from kumite.clip import ClipSet
+from kumite.errors import KumiteError, unknown
+from kumite.graph.avoiding import build_avoidance
+from kumite.graph.errands import build_preparation
+from kumite.graph.joins import JoinBound
+from kumite.graph.layer import Layer, build_frames
+from kumite.graph.whole import build_actions
 
-KIND = "library"
-_REPORTED = {
-    **dict.fromkeys(("event", "level"), text),
-    **dict.fromkeys(("every", "threshold", "mean_join_cost", "mean_action_s", "alike"), number),
-    **dict.fromkeys(("transitions", "candidates", "frames_kept", "hits_kept", "nodes"), whole),
-}  # what a report's values must be, where readers count on it
-VERSION = 5
-
-_NO_PARTS = no_avoidance(np.zeros(1, np.int64))  # of clips that are not known yet
+LAYERS = ("frames", "actions", "avoidance", "preparation")
 
 
 @brief
 @pictured
 @dataclass(frozen=True)
 class Library:
-    """Everything a controller and a scene need of the captured motion."""
+    """Clips and the motion graphs over them that they allow.
 
-    clips: ClipSet
-    contacts: Contacts
-    strikes: Strikes
-    table: ActionTable
-    report: dict[str, Any] = field(default_factory=dict)  # how it was built, JSON values
-    actions: Actions | None = None  # what the stretches of an action-level graph are
-    avoidance: AvoidanceParts = _NO_PARTS  # kept whole in the graph; none unless it was asked for
-    preparing: Preparing | None = None  # what a hierarchical graph is made of
+    layers: by name, of ``frames`` (Lee & Lee 2004), whole ``actions`` (Shum et al. 2012),
+    ``avoidance`` (Oshita & Masaoka 2011) and ``preparation`` (Shum et al. 2013), in that order; all
+    are of the same clips. missing: why each of the others could not be made.
+
+    Errors: no layer, one of another name, layers of different clips.
+    """
+
+    layers: Mapping[str, Layer]
+    missing: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name, value in mapping(self.report, "library: report").items():
-            if name in _REPORTED:
-                _REPORTED[name](value, f"library: report: {name}")
-        frames = len(self.clips)
-        if len(self.avoidance) == 0:
-            object.__setattr__(self, "avoidance", no_avoidance(self.clips.clip_start))
-        if not np.array_equal(self.avoidance.clip_start, self.clips.clip_start):
-            raise KumiteError("library: its avoidance parts are of other clips")
-        for what, found in (
-            ("contacts", len(self.contacts.on_ground)),
-            ("strikes", len(self.strikes.effective)),
-        ):
-            if found != frames:
-                raise KumiteError(f"library: {what} of {found} frames, clips of {frames}")
-        first, last = self.table.first - 1, self.table.last  # actions enter at first - 1
-        clip = self.clips.clip_of_frame
-        if self.table.state_frame[-1] >= frames or np.any(last >= frames):
-            raise KumiteError("library: a state or an action is none of its frames")
-        if np.any(clip[first] != clip[last]):
-            raise KumiteError("library: an action leaves its clip")
-        if self.actions is not None:
-            if not np.array_equal(self.actions.clip_start, self.clips.clip_start):
-                raise KumiteError("library: its actions are of other clips")
-            mine = self.action_of_stretch
-            if np.any(mine < 0) or np.any(self.actions.stop[mine] - 1 != last):
-                raise KumiteError("library: a stretch is not an action")
-        if self.preparing is not None:
-            self.preparing.check(self.clips, len(self.table.first))
+        layers = freeze_mapping(self, "layers", LAYERS, Layer, "library: layers")
+        freeze_mapping(self, "missing", LAYERS, str, "library: missing layers")
+        if not layers:
+            raise KumiteError("library: no layers; expected at least one")
+        first = next(iter(layers.values()))
+        for name, layer in layers.items():
+            if layer.clips is not first.clips or layer.contacts is not first.contacts:
+                raise KumiteError(f"library: layer {name}: of other clips")
 
-    def facts(self) -> list[str]:
-        level = self.report.get("level") or ("frames" if self.actions is None else "actions")
-        return [
-            f"level {level}",
-            *self.clips.facts(),
-            f"{len(self.strikes)} blows",
-            f"{self.table.states} states",
-            f"{self.table.actions} actions",
-        ]
+    @staticmethod
+    def of(layer: Layer) -> Library:
+        """A library of one layer."""
+        return Library({layer.name: layer})
 
     @property
-    def action_of_stretch(self) -> np.ndarray:
-        """The action [L] that each stretch of an action-level graph plays. Errors: it is none."""
-        if self.actions is None:
-            raise KumiteError(
-                "the library's graph is one of frames; expected one of whole actions "
-                "(kumite build --level actions)"
-            )
-        return np.searchsorted(self.actions.start, self.table.first, side="right") - 1
+    def clips(self) -> ClipSet:
+        """Of all layers."""
+        return next(iter(self.layers.values())).clips
 
-    @cached_property
-    def parts_of_stretch(self) -> tuple[np.ndarray, np.ndarray]:
-        """The avoidance parts that stretches play, as CSR: those of stretch l are
-        ``part[begin[l]:begin[l + 1]]``, in order (begin [L + 1], part [K]). One of which a stretch
-        has only some frames is not among them.
-        """
-        return self.avoidance.within(self.table.first, self.table.last)
+    @property
+    def contacts(self) -> Contacts:
+        """When feet stand in the clips."""
+        return next(iter(self.layers.values())).contacts
 
     @cached_property
     def digest(self) -> str:
-        """16 hex digits that name the content: what is computed from it is cached under them."""
-        h = hashlib.sha256(f"{VERSION}{self.clips.fps}{self.clips.skeleton.names}".encode())
-        for array in _arrays(self).values():
-            h.update(np.ascontiguousarray(array).tobytes())
-        if self.preparing is not None:
-            h.update(str(_preparing_header(self.preparing)).encode())
-        return h.hexdigest()[:16]
+        """16 hex digits that name the content."""
+        of = "".join(f"{name}{layer.digest}" for name, layer in self.layers.items())
+        return hashlib.sha256(of.encode()).hexdigest()[:16]
+
+    def layer(self, name: str) -> Layer:
+        """A layer by name. Errors: there is none of that name, and why."""
+        if name not in LAYERS:
+            raise unknown("layer", name, LAYERS)
+        if name not in self.layers:
+            why = self.missing.get(name, "it was not built")
+            raise KumiteError(
+                f"the library has no layer {name!r} ({why}); expected it among "
+                f"{', '.join(self.layers)}: build it again (kumite build), from clips that allow it"
+            )
+        return self.layers[name]
+
+    def facts(self) -> list[str]:
+        return [
+            *self.clips.facts(),
+            *(f"{n}: {x.table.states} states, {x.table.actions} actions"
+              for n, x in self.layers.items()),
+        ]  # fmt: skip
 
 
 def build_library(
     clips: ClipSet,
     *,
-    event: str = "left",
-    per_second: float = PER_SECOND,
-    largest_share: float = LARGEST_SHARE,
-    avoidance: AvoidanceParts | bool = False,
+    layers: Iterable[str] | None = None,
     bound: JoinBound | None = None,
     progress: Callable[[str], None] = lambda stage: None,
+    **options: Mapping[str, Any],
 ) -> Library:
-    """Notes, transitions, component and action table of a set of clips.
+    """A library of every layer that some clips allow.
 
-    bound: the farthest that a join may jump; None: the usual (:class:`JoinBound`). avoidance: parts
-    to keep whole, each within one action of the table (Oshita & Masaoka 2011,
-    section 3.1); True: as they are found; False: none. progress is told each stage as it begins.
-    Errors: too few frames; no such contact event; parts of other clips.
+    layers: those that it must have and no others; None: those that can be made. bound: the farthest
+    that a join may jump; None: the usual (:class:`JoinBound`). options: of a layer's own builder by
+    the layer's name, such as ``frames={"event": "both"}`` (:func:`build_frames`,
+    :func:`build_actions`, :func:`build_avoidance`, :func:`build_preparation`): such a layer must be
+    made, too. progress is told each stage as it begins.
+
+    Errors: a layer that must be made cannot be; none can be made: why not, of each; an unknown
+    layer.
     """
     instance(clips, ClipSet, "build_library")
+    wanted = LAYERS if layers is None else tuple(layers)
+    for name in (*wanted, *options):
+        if name not in LAYERS:
+            raise unknown("layer", name, LAYERS)
+    must = set(options) if layers is None else set(wanted)
     progress("finding contacts and effective hits")
     contacts = find_contacts(clips)
-    strikes = find_strikes(clips)
-    parts = chosen_parts(clips, contacts, avoidance, progress)
-    progress("comparing poses")
-    features = pose_features(clips)
-    transitions = find_transitions(
-        clips,
-        contacts,
-        event=event,
-        per_second=per_second,
-        largest_share=largest_share,
-        features=features,
-        whole=parts,
-    )
-    told = {"event": event, "per_second": per_second, "largest_share": largest_share}
-    progress("folding the graph")
-    library = folded(clips, contacts, strikes, transitions, parts, told, bound)
-    return with_parts(library, avoidance)
+    noted = {"contacts": contacts, "strikes": find_strikes(clips), "bound": bound}
+    made: dict[str, Layer] = {}
+    missing: dict[str, str] = {}
+    for name in LAYERS:
+        if name not in wanted:
+            continue
+
+        def tell(stage: str, name: str = name) -> None:
+            progress(f"{name}: {stage}")
+
+        try:
+            made[name] = _BUILDERS[name](
+                clips, **{**noted, "progress": tell, **options.get(name, {})}
+            )
+        except KumiteError as error:
+            if name in must:
+                raise
+            missing[name] = str(error)
+    if not made:
+        raise KumiteError("; ".join(f"{name}: {why}" for name, why in missing.items()))
+    return Library(made, missing)
 
 
-def folded(
-    clips: ClipSet,
-    contacts: Contacts,
-    strikes: Strikes,
-    transitions: Transitions,
-    parts: AvoidanceParts,
-    told: Mapping[str, Any],
-    bound: JoinBound | None = None,
-) -> Library:
-    """The library of the connected part of a graph of frames. told: how its transitions were found,
-    for the report. bound: of joins; None: the usual. Errors: too few frames; no join keeps to it.
-    """
-    bound = bound or JoinBound()
-    every, transitions = transitions, bounded(clips, transitions, bound)
-    kept = strongest_component(clips, transitions)
-    table = fold(clips, transitions, kept)
-    report = {
-        **told,
-        "join_bound": asdict(bound),
-        "joins_over_bound": len(every) - len(transitions),
-        "left_out": _left_out(clips, every, transitions, kept),
-        "fps": clips.fps,
-        "frames": len(clips),
-        "frames_kept": int(kept.sum()),
-        "candidates": transitions.candidates,
-        "transitions": len(transitions),
-        "threshold": transitions.threshold,
-        **counted(clips, table, strikes, kept),
-    }
-    return Library(clips, contacts, strikes, table, report, None, parts)
-
-
-def _left_out(
-    clips: ClipSet, every: Transitions, transitions: Transitions, kept: np.ndarray
-) -> dict[str, int]:
-    """Why frames are not in the graph, and how many. every: transitions over the bound, too."""
-    clip, frame = clips.clip_of_frame, np.arange(len(clips))
-    could = np.zeros(len(clips), dtype=bool)
-    if len(every) > len(transitions):
-        could = strongest_component(clips, every)
-    # Of each clip the last frame to leave from and the first to come to.
-    last, first = np.full(len(clips.names), -1), np.full(len(clips.names), len(clips))
-    np.maximum.at(last, clip[every.source], every.source)
-    np.minimum.at(first, clip[every.target], every.target)
-    out: dict[str, int] = {}
-    left = ~kept
-    for why, these in (
-        ("joins over the bound", could),
-        ("clips without joins", (last[clip] < 0) & (first[clip] == len(clips))),
-        ("after a clip's last way out", frame > last[clip]),
-        ("before a clip's first way in", frame < first[clip]),
-        ("joined only among themselves", np.ones(len(clips), dtype=bool)),
-    ):
-        count = int(np.count_nonzero(left & these))
-        if count:
-            out[why] = count
-        left &= ~these
-    return out
-
-
-def counted(
-    clips: ClipSet, table: ActionTable, strikes: Strikes, kept: np.ndarray
-) -> dict[str, Any]:
-    """What a report says of a table. kept [F]: the frames that are in it."""
-    jumps = table.join_cost[table.join_cost > 0]
-    return {
-        "states": table.states,
-        "actions": table.actions,
-        "stretches": len(table.first),
-        "mean_action_s": float(table.duration[table.stretch].mean() / clips.fps),
-        "mean_join_cost": float(jumps.mean()) if len(jumps) else 0.0,
-        "hits": len(strikes),
-        "hits_kept": int(kept[strikes.frame].sum()),
-    }
-
-
-def chosen_parts(
-    clips: ClipSet,
-    contacts: Contacts,
-    avoidance: AvoidanceParts | bool,
-    progress: Callable[[str], None],
-    actions: Actions | None = None,
-) -> AvoidanceParts:
-    """The parts that a graph is to keep whole. Errors: parts of other clips."""
-    if avoidance is False:
-        return no_avoidance(clips.clip_start)
-    if avoidance is True:
-        progress("finding avoidance parts")
-        return find_avoidance(clips, contacts, actions=actions)
-    if not np.array_equal(avoidance.clip_start, clips.clip_start):
-        raise KumiteError("avoidance parts: of other clips")
-    return avoidance
-
-
-def with_parts(library: Library, avoidance: AvoidanceParts | bool) -> Library:
-    """The library, its report with a count of avoidance parts where they were asked for."""
-    if avoidance is False:
-        return library
-    held = len(np.unique(library.parts_of_stretch[1]))
-    count = {"avoidance_parts": len(library.avoidance), "avoidance_parts_kept": held}
-    return replace(library, report={**library.report, **count})
-
-
-def _group(prefix: str, record: Any) -> dict[str, np.ndarray]:
-    return {f"{prefix}.{f.name}": getattr(record, f.name) for f in fields(record)}
-
-
-def _arrays(library: Library) -> dict[str, np.ndarray]:
-    clips = library.clips
-    return {
-        "clips.clip_start": clips.clip_start,
-        "clips.root_position": clips.root_position,
-        "clips.wxyz": clips.wxyz,
-        "skeleton.parents": clips.skeleton.parents,
-        "skeleton.offsets": clips.skeleton.offsets,
-        "skeleton.tip_parents": clips.skeleton.tip_parents,
-        "skeleton.tip_offsets": clips.skeleton.tip_offsets,
-        **_group("contacts", library.contacts),
-        **_group("strikes", library.strikes),
-        **_group("table", library.table),
-        "avoidance.start": library.avoidance.start,
-        "avoidance.stop": library.avoidance.stop,
-        **({} if library.actions is None else _action_arrays(library.actions)),
-        **({} if library.preparing is None else _preparing_arrays(library.preparing)),
-    }
-
-
-def _action_arrays(actions: Actions) -> dict[str, np.ndarray]:
-    group = _group("actions", actions)
-    del group["actions.label"], group["actions.clip_start"]  # a header's, and the clips'
-    return group
-
-
-def _preparing_arrays(preparing: Preparing) -> dict[str, np.ndarray]:
-    h = preparing.hierarchy
-    group = {
-        **_group("preparing", preparing),
-        **_group("hierarchy", h),
-        **_group("cores", h.cores),
-        **_group("targets", h.targets),
-    }
-    of_a_header = ("cores.label", "cores.fps", "targets.label", "hierarchy.alike")
-    records = ("preparing.hierarchy", "hierarchy.cores", "hierarchy.targets")
-    return {name: a for name, a in group.items() if name not in (*of_a_header, *records)}
-
-
-def _preparing_header(preparing: Preparing) -> dict[str, Any]:
-    h = preparing.hierarchy
-    return {"cores": list(h.cores.label), "targets": list(h.targets.label), "alike": h.alike}
-
-
-def _preparing(header: Any, part: Callable[[str], dict[str, Any]], fps: float) -> Preparing:
-    return Preparing(
-        Hierarchy(
-            cores=Cycles(label=header["cores"], fps=fps, **part("cores")),
-            targets=Targets(label=header["targets"], **part("targets")),
-            alike=header["alike"],
-            **part("hierarchy"),
-        ),
-        **part("preparing"),
-    )
-
-
-def save_library(path: Path | str, library: Library) -> None:
-    """Errors: no library; a file that cannot be written."""
-    instance(library, Library, "save_library")
-    header = {
-        "clip_names": list(library.clips.names),
-        "fps": library.clips.fps,
-        "joint_names": list(library.clips.skeleton.names),
-        "roles": dict(library.clips.skeleton.roles),
-        "report": library.report,
-        "labels": None if library.actions is None else list(library.actions.label),
-        "preparing": None if library.preparing is None else _preparing_header(library.preparing),
-    }
-    files.save(path, KIND, VERSION, header, _arrays(library))
-
-
-def load_library(path: Path | str) -> Library:
-    """Errors: missing, damaged, another kind of file, another version."""
-    header, arrays = files.load(path, KIND, VERSION)
-
-    def part(prefix: str) -> dict[str, np.ndarray]:
-        dot = prefix + "."
-        return {k.removeprefix(dot): v for k, v in arrays.items() if k.startswith(dot)}
-
-    try:
-        skeleton = Skeleton(names=header["joint_names"], roles=header["roles"], **part("skeleton"))
-        clips = ClipSet(
-            skeleton=skeleton,
-            fps=header["fps"],
-            names=header["clip_names"],
-            **part("clips"),
-        )
-        return Library(
-            clips,
-            Contacts(**part("contacts")),
-            Strikes(**part("strikes")),
-            ActionTable(**part("table")),
-            header["report"],
-            None
-            if header["labels"] is None
-            else Actions(label=header["labels"], clip_start=clips.clip_start, **part("actions")),
-            AvoidanceParts(clip_start=clips.clip_start, **part("avoidance")),
-            None
-            if header["preparing"] is None
-            else _preparing(header["preparing"], part, clips.fps),
-        )
-    except files.UNREADABLE as error:
-        raise KumiteError(f"{path}: damaged library ({error})") from None
+_BUILDERS: Mapping[str, Callable[..., Layer]] = {
+    "frames": build_frames,
+    "actions": build_actions,
+    "avoidance": build_avoidance,
+    "preparation": build_preparation,
+}

@@ -54,11 +54,13 @@ def find_transitions(
     largest_share: float = LARGEST_SHARE,
     features: PoseFeatures | None = None,
     whole: AvoidanceParts | None = None,
+    without: np.ndarray | None = None,
 ) -> Transitions:
     """The best transitions, about ``per_second`` for each second of capture.
 
     whole: parts of the clips that no transition enters behind their first frame, or leaves before
-    their last. Errors: an unknown event; no such event in the clips.
+    their last. without [F] bool: frames that none leaves or enters. Errors: an
+    unknown event; no such event in the clips.
     """
     if event not in EVENTS:
         raise unknown("event", event, EVENTS)
@@ -70,6 +72,9 @@ def find_transitions(
         # Who leaves from frame i leaves out i + 1; who joins at i plays i + 1 first: of a part both
         # must not be, unless it is its first frame.
         free = ~whole.inner[frames + 1]
+        frames, group = frames[free], group[free]
+    if without is not None:
+        free = ~(without[frames] | without[frames + 1])
         frames, group = frames[free], group[free]
     if len(frames) < 2:
         raise KumiteError(

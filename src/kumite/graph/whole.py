@@ -23,9 +23,9 @@ from kumite.annotate import (
     KINDS,
     Actions,
     AvoidanceParts,
+    Contacts,
+    Strikes,
     find_actions,
-    find_contacts,
-    find_strikes,
     only_blows,
     shorter_rests,
 )
@@ -35,7 +35,7 @@ from kumite.clip import ClipSet
 from kumite.errors import KumiteError
 from kumite.graph.distance import pose_features
 from kumite.graph.joins import JoinBound, JoinMeter
-from kumite.graph.library import Library, chosen_parts, with_parts
+from kumite.graph.layer import Layer, chosen_parts, noted, with_parts
 from kumite.graph.table import ActionTable
 from kumite.kernels import distance as kernels
 from kumite.rotation import planar_compose, planar_inverse
@@ -47,7 +47,7 @@ REST = 0.7  # s: longer rests are offered in parts
 _SPARE = 8  # rows that the kernel may write beyond the last
 
 
-def build_action_library(
+def build_actions(
     clips: ClipSet,
     actions: Actions | None = None,
     *,
@@ -55,9 +55,13 @@ def build_action_library(
     most_ways: int = MOST_WAYS,
     avoidance: AvoidanceParts | bool = False,
     bound: JoinBound | None = None,
+    contacts: Contacts | None = None,
+    strikes: Strikes | None = None,
     progress: Callable[[str], None] = lambda stage: None,
-) -> Library:
-    """Notes and the action-level graph of a set of clips.
+) -> Layer:
+    """The layer ``actions``: the action-level graph of a set of clips.
+
+    contacts, strikes: of these clips, if they are known.
 
     actions: of these clips, by default as the motion analyser finds them. alike: how far [rad]
     poses of one node may be apart. most_ways: actions that a state offers at most; of more those of
@@ -67,14 +71,13 @@ def build_action_library(
     none. bound: the farthest that a join may jump; None: the usual (:class:`JoinBound`). Errors: no
     connected part with two actions that can be chosen.
     """
-    instance(clips, ClipSet, "build_action_library")
+    instance(clips, ClipSet, "build_actions")
     if most_ways < 2:
         raise KumiteError(f"most_ways {most_ways}; expected at least 2")
     if not 0 < alike < np.inf:
         raise KumiteError(f"alike {alike}; expected more than 0 rad")
     bound = bound or JoinBound()
-    progress("finding contacts and effective hits")
-    contacts, strikes = find_contacts(clips), find_strikes(clips)
+    contacts, strikes = noted(clips, contacts, strikes, progress)
     if actions is None:
         progress("finding actions")
         actions = find_actions(clips, contacts, strikes)
@@ -157,7 +160,7 @@ def build_action_library(
         "hits_kept": _inside(strikes.frame, first, state_frame),
         **{f"{kind}s": int(np.sum(keep & (actions.kind == k))) for k, kind in enumerate(KINDS)},
     }
-    return with_parts(Library(clips, contacts, strikes, table, report, actions, parts), avoidance)
+    return with_parts(Layer(clips, contacts, strikes, table, report, actions, parts), avoidance)
 
 
 def uncut(actions: Actions, parts: AvoidanceParts, shortest: int = 1) -> Actions:

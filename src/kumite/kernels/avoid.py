@@ -241,7 +241,7 @@ def put_body(volumes, low, high, row, share, following, frame, out):
 
 @lean_kernel
 def phase_at(x, k, path, now, graph, scratch):
-    """Library phase of a path's edge k, x frames from now, and the last frame of the edge."""
+    """Layer phase of a path's edge k, x frames from now, and the last frame of the edge."""
     if k == 0:
         return now.phase + x, now.stop
     s = path[k - 1]

@@ -9,7 +9,7 @@ import numpy as np
 from kumite.annotate import Actions
 from kumite.clip import LIMBS
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.rotation import from_yaw, multiply, planar_apply, planar_inverse
 from kumite.scene.recording import Event, Recording
 from kumite.scene.stage import Playback
@@ -17,7 +17,7 @@ from kumite.scene.stage import Playback
 WHO = "actor"
 
 
-def action_recording(library: Library, action: int) -> Recording:
+def action_recording(library: Layer, action: int) -> Recording:
     """An action as it was captured, from the origin and facing +Z, with the blows in it.
 
     Errors: a library without actions; no such action.
@@ -58,12 +58,12 @@ def action_recording(library: Library, action: int) -> Recording:
     )
 
 
-def _actions(library: Library) -> Actions:
+def _actions(library: Layer) -> Actions:
     actions = library.actions
     if actions is None or len(actions) == 0:
         raise KumiteError(
             "the library holds no actions; expected one of whole actions "
-            "(kumite build --level actions)"
+            "(kumite build --layer actions)"
         )
     return actions
 
@@ -71,7 +71,7 @@ def _actions(library: Library) -> Actions:
 class ActionPlayback(Playback):
     """A library's actions on the stage. Errors: a library without actions."""
 
-    def __init__(self, library: Library, action: int = 0) -> None:
+    def __init__(self, library: Layer, action: int = 0) -> None:
         self.library = library
         self.actions = _actions(library)
         super().__init__(action_recording(library, action))

@@ -17,7 +17,7 @@ from kumite.clip import LIMBS, forward_kinematics
 from kumite.control import Fighters, Skill, approach, stretch_tracks, strike, trained
 from kumite.control.attack import Attack, from_limbs
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.kernels.blow import NO_BLOW
 from kumite.rotation import planar_apply, planar_inverse, rotate, wrap_angle
 from kumite.scene.recording import Recording
@@ -38,7 +38,7 @@ class Blow:
 
 
 def skill_of(
-    library: Library,
+    library: Layer,
     cache: Path | None,
     progress: Callable[[str, int, float], None] = lambda name, sweep, residual: None,
 ) -> Skill:
@@ -157,7 +157,7 @@ def _runs(thrown: np.ndarray) -> list[tuple[int, int, int, int]]:
     return out
 
 
-def middle_of(library: Library, body: Body, part: str) -> np.ndarray:
+def middle_of(library: Layer, body: Body, part: str) -> np.ndarray:
     """Where the middle of a part is [F, 3] at every frame of a library, in its world."""
     position, world = library.clips.world
     p = body.part(part)

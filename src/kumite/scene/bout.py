@@ -26,7 +26,7 @@ from kumite.control.game_tree import (
     Player,
 )
 from kumite.errors import KumiteError, unknown
-from kumite.graph import Library
+from kumite.graph import Layer, Library
 from kumite.kernels.blow import NO_BLOW, NOBODY
 from kumite.kernels.moves import FALL, NOTHING
 from kumite.rotation import planar_compose
@@ -59,11 +59,11 @@ class BoutScene:
     Follows the :class:`~kumite.scene.stage.Stage` protocol, so the studio can show it.
     """
 
-    def __init__(self, settings: SceneSettings, library: Library, *, seed: int = 0) -> None:
+    def __init__(self, settings: SceneSettings, library: Library | Layer, *, seed: int = 0) -> None:
         """Errors: a library whose graph is not one of whole actions; names in A⁺, A⁻ or at check
         points that no action has.
         """
-        check_scene(settings, library, seed)
+        library = check_scene(settings, library, seed, "actions")
         if not settings.fighters:
             raise KumiteError(f"{settings.title!r} is no fight by game tree; expected [[fighter]]s")
         self.settings = settings

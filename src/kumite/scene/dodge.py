@@ -8,7 +8,7 @@ from kumite.body import lay_body
 from kumite.control.attack import thrown
 from kumite.control.avoidance import AvoidanceSearch, Outcome
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Layer, Library
 from kumite.scene.balls import Balls, aimed, capsules_of, velocity_to
 from kumite.scene.controls import SearchControl, search_controls
 from kumite.scene.dodgers import Dodgers, background, volume_of
@@ -29,9 +29,9 @@ class DodgeScene:
     Follows the :class:`~kumite.scene.stage.Stage` protocol, so the studio can show it.
     """
 
-    def __init__(self, settings, library: Library, *, seed: int = 0) -> None:
+    def __init__(self, settings, library: Library | Layer, *, seed: int = 0) -> None:
         """Errors: nobody in it; a library without avoidance parts; too many characters."""
-        check_scene(settings, library, seed)
+        library = check_scene(settings, library, seed, "avoidance")
         if not settings.dodging:
             raise KumiteError(f"{settings.title!r} has nobody who avoids; expected [[dodger]]s")
         self.settings, self.library, self.title = settings, library, settings.title

@@ -7,17 +7,33 @@ from pydantic import BaseModel
 
 from kumite.checks import FAR, array, instance, shown, whole
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Layer, Library
 
 
-def check_scene(settings: object, library: object, seed: object) -> None:
-    """Errors: settings of no scene, such as its name; no library; a seed that is no number."""
+def check_scene(settings: object, library: object, seed: object, *layers: str) -> Layer:
+    """The layer that a scene runs on, which may be given in place of a library that has it.
+
+    layers: that it can run on, the best first.
+
+    Errors: settings of no scene, such as its name; no library, or one without the layer; a seed
+    that is no number.
+    """
     if not isinstance(settings, BaseModel):
         raise KumiteError(
             f"scene: {shown(settings)}; expected its settings, as kumite.load_scene gives them"
         )
-    instance(library, Library, "library")
     whole(seed, "seed", least=0)
+    return layer_of(library, "library", *layers)
+
+
+def layer_of(library: object, what: str, *layers: str) -> Layer:
+    """The first of some layers that a library has, or the layer itself that is given.
+
+    Errors: neither; no such layer.
+    """
+    if isinstance(library, Library):
+        return library.layer(next((n for n in layers if n in library.layers), layers[0]))
+    return instance(library, Layer, what)
 
 
 def a_place(position: object, name: str) -> np.ndarray:

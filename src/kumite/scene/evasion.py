@@ -15,19 +15,18 @@ import numpy as np
 
 from kumite.body import ARMS
 from kumite.body.spheres import SWORD
-from kumite.checks import instance
 from kumite.clip import LIMBS, Skeleton
 from kumite.control.attack import Attack
 from kumite.control.avoidance import AvoidanceSearch
 from kumite.control.counter import CounterSearch
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Layer, Library
 from kumite.rotation import planar_apply, wrap_angle
 from kumite.scene.apart import held_apart, push_two
 from kumite.scene.attackers import Attackers, Blow, middle_of, skill_of
 from kumite.scene.blows import Blows, Contact
 from kumite.scene.dodgers import Dodgers, volume_of
-from kumite.scene.doors import check_scene
+from kumite.scene.doors import check_scene, layer_of
 from kumite.scene.live import RECOIL
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.recording import Event
@@ -91,8 +90,8 @@ class EvasionScene:
     def __init__(
         self,
         settings,
-        library: Library,
-        attack: Library,
+        library: Library | Layer,
+        attack: Library | Layer,
         *,
         seed: int = 0,
         cache: Path | None = None,
@@ -103,8 +102,8 @@ class EvasionScene:
         Errors: either side is empty; a library without avoidance parts, or one without blows;
         libraries of different bodies or frame rates; too many characters.
         """
-        check_scene(settings, library, seed)
-        instance(attack, Library, "the attackers' library")
+        library = check_scene(settings, library, seed, "avoidance")
+        attack = layer_of(attack, "the attackers' library", "frames", "actions")
         if not (settings.dodging and settings.attacker):
             raise KumiteError(
                 f"{settings.title!r} needs somebody who avoids and somebody who attacks; expected "

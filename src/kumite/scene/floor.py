@@ -8,7 +8,7 @@ import numpy as np
 
 from kumite.body import ARMS, lay_body
 from kumite.clip import LIMBS
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.kernels import crowd as kernels
 from kumite.kernels import near
 from kumite.kernels.blow import NO_BLOW, NO_HIT, NO_LIMB, NOBODY
@@ -37,7 +37,7 @@ class Landing:
 class Floor:
     """K characters as arrays, and who aims at whom."""
 
-    def __init__(self, library: Library, count: int) -> None:
+    def __init__(self, library: Layer, count: int) -> None:
         self.library = library
         self.fps = library.clips.fps
         self.body = lay_body(library.clips.skeleton)

@@ -22,7 +22,7 @@ from kumite.control import (
     trained,
 )
 from kumite.errors import KumiteError, unknown
-from kumite.graph import Library
+from kumite.graph import Layer, Library
 from kumite.kernels import crowd as kernels
 from kumite.kernels.blow import NO_BLOW, NOBODY, swept_contact
 from kumite.kernels.character import MANY
@@ -74,7 +74,7 @@ class LiveScene:
     def __init__(
         self,
         settings: SceneSettings,
-        library: Library,
+        library: Library | Layer,
         *,
         seed: int = 0,
         cache: Path | None = None,
@@ -85,7 +85,7 @@ class LiveScene:
 
         Errors: a library that nobody can strike with, an unknown behaviour, too many characters.
         """
-        check_scene(settings, library, seed)
+        library = check_scene(settings, library, seed, "frames", "actions")
         self.settings = settings
         self.library = library
         self.title = settings.title

@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 
 from kumite.checks import instance
 from kumite.clip import SIDES, Skeleton, facing_frame, forward_kinematics
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.rotation import wrap_angle
 from kumite.scene.recording import NO_FRAME, Event, Recording
 from kumite.scene.reports import Report, reports
@@ -59,7 +59,7 @@ def foot_skate(
     return float(planted.mean()) if len(planted) else 0.0
 
 
-def source_skate(library: Library) -> float:
+def source_skate(library: Layer) -> float:
     """Foot skate of the captured clips [m/s]."""
     clips = library.clips
     position, _ = clips.world

@@ -15,7 +15,7 @@ from kumite.scene.settings_prepare import PrepareSettings
 class Needs:
     """What a scene is given when nothing is said, and what one's own has to hold."""
 
-    level: str  # of the library: 'kumite build --level'
+    level: str  # of the library: 'kumite build --layer'
     style: str  # of the built-in performer, who stands in for a library
     motions: tuple[str, ...]  # kinds of motion, or targets by label, that the library must hold
     attackers: str | None = None  # the library of those who attack: a style, or a file

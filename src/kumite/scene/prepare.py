@@ -13,7 +13,7 @@ from kumite.clip import LIMBS
 from kumite.control.guide import learned_guide, seen
 from kumite.control.preparation import PreparationSettings
 from kumite.errors import KumiteError, unknown
-from kumite.graph import Library
+from kumite.graph import Layer, Library
 from kumite.graph.preparing import Preparing
 from kumite.kernels.blow import swept_contact
 from kumite.rotation import rotate
@@ -50,7 +50,7 @@ class PrepareScene:
     def __init__(
         self,
         settings,
-        library: Library,
+        library: Library | Layer,
         *,
         seed: int = 0,
         cache: Path | None = None,
@@ -61,11 +61,11 @@ class PrepareScene:
 
         Errors: another kind of library; motions that it does not have; obstacles that these do
         not clear; somebody who begins in an obstacle; too many characters."""
-        check_scene(settings, library, seed)
+        library = check_scene(settings, library, seed, "preparation")
         if library.preparing is None:
             raise KumiteError(
                 f"{settings.title!r} is about preparation; expected a library built with "
-                "'kumite build --level preparation'"
+                "'kumite build --layer preparation'"
             )
         self.settings, self.library, self.title = settings, library, settings.title
         self.preparing: Preparing = library.preparing

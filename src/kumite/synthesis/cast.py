@@ -12,7 +12,7 @@ import numpy as np
 
 from kumite.clip import SIDES, Skeleton, facing_frame
 from kumite.errors import KumiteError
-from kumite.graph import Library
+from kumite.graph import Layer
 from kumite.kernels import character as kernels
 from kumite.kernels.blow import NO_BLOW
 from kumite.kernels.phase import AT_FRAME, move_all
@@ -33,7 +33,7 @@ BLOW_BEFORE, BLOW_AFTER = 0.07, 0.12  # s around the effective frames in which a
 class Cast:
     """K characters. Arrays named as in ``kernels/character.py``; each frame overwrites the last."""
 
-    def __init__(self, library: Library, count: int) -> None:
+    def __init__(self, library: Layer, count: int) -> None:
         self.library = library
         clips, skeleton = library.clips, library.clips.skeleton
         joints = len(skeleton)
@@ -143,7 +143,7 @@ class Cast:
         return np.where(self._waits, np.maximum(self.frame, self.stop), self.frame)
 
     def frames_ahead(self, who: np.ndarray, steps: np.ndarray) -> np.ndarray:
-        """Library frames [W, T] at which characters who [W] will be after steps [T], no farther
+        """Layer frames [W, T] at which characters who [W] will be after steps [T], no farther
         than their actions go."""
         along = self.fraction[who, None] + steps * self.rate[who, None]
         frame = self.frame[who, None] + np.floor(along + AT_FRAME).astype(np.int64)
@@ -365,7 +365,7 @@ def _below(skeleton: Skeleton, legs: list[list[int]]) -> np.ndarray:
     return out
 
 
-def blow_windows(library: Library) -> np.ndarray:
+def blow_windows(library: Layer) -> np.ndarray:
     """The blow [F, 4] int32 that each limb throws at a frame, or NO_BLOW."""
     strikes, clips = library.strikes, library.clips
     out = np.full((len(clips), 4), NO_BLOW, dtype=np.int32)
