@@ -25,7 +25,7 @@ from kumite.annotate import (
 from kumite.annotate.action_file import ActionFile, Line, Section, merge, parse, write
 from kumite.annotate.action_score import score_actions, true_boundaries
 from kumite.annotate.segments import Cut, CutSettings, find_cuts, find_motion
-from kumite.cli import app
+from kumite.cli.start import app
 from kumite.clip import Clip, ClipSet, concatenate
 from kumite.errors import KumiteError
 from kumite.performer import perform

@@ -28,7 +28,7 @@ from kumite.annotate import (
 )
 from kumite.annotate.action_file import Line, merge, parse, to_lines, write
 from kumite.annotate.action_score import score_avoidance, true_avoidance
-from kumite.cli import app
+from kumite.cli.start import app
 from kumite.clip import Clip, ClipSet, Skeleton, concatenate, mirror, resample
 from kumite.errors import KumiteError
 from kumite.graph import (

@@ -15,7 +15,7 @@ from kumite import rotation
 from kumite.clip import Clip, Skeleton, check, forward_kinematics
 from kumite.errors import KumiteError
 from kumite.export.bvh import write_bvh
-from kumite.mocap import folder
+from kumite.mocap import sources
 from kumite.mocap.folder import Loaded, find_asf, load
 
 # The manifest's scale of these five is not a person's. By it the soccer players' hips are 4.8 m
@@ -392,4 +392,4 @@ def test_files_of_another_skeleton_beside(mocap: Path, tmp_path: Path) -> None:
     shutil.copy(mocap / "woody/idle_65.bvh", tmp_path)
     scales = {i.name: i.metres_per_unit for i in load(tmp_path).info}
     assert scales == {"PushBack00": 0.01, "idle_65": 0.0254}
-    assert folder.SUFFIXES == (".bvh", ".amc")
+    assert sources.SUFFIXES == (".bvh", ".amc")

@@ -16,20 +16,61 @@ from kumite.scene import catalogue, load_scene, settings
 
 ROOT = Path(__file__).parents[1]
 
+BROKEN = """
+title = "nothing fits"
+[[fighter]]
+name = "red"
+position = [0.0, 0.0]
+against = "blue"
+style = "bxer"
+[[dodger]]
+name = "blue"
+[balls]
+speed = [9.0, 3.0]
+"""
+COMMANDS = ("info", "build", "perform", "likeness", "spheres", "segment", "train")
+COMMANDS += ("scenes", "run", "metrics", "export", "studio", "bench")
 # Each ends before anything has to be computed.
 QUICK = [
     (["--help"], 0),
     (["--version"], 0),
-    (["run", "--help"], 0),
+    *(([command, "--help"], 0) for command in COMMANDS),
     (["scenes"], 0),
     (["run", "sparing"], 2),
+    (["run", "broken.toml"], 2),
+    (["run", "sparring", "--count", "3"], 2),
+    (["run", "sparring", "--throws", "3"], 2),
     (["run", "sparring", "--out", "fight.foo"], 2),
+    (["run", "sparring", "--out", "broken.toml/fight.rec"], 2),
+    (["run", "sparring", "--library", "missing"], 2),
+    (["run", "sparring", "--library", "broken.toml"], 2),
     (["studio", "sparing"], 2),
+    (["studio", "broken.toml"], 2),
+    (["studio", "sparring", "--library", "missing.kumite"], 2),
+    (["studio", "missing.rec"], 2),
+    (["studio", "missing.kumite"], 2),
     (["export", "fight.rec", "-o", "fight.foo"], 2),
+    (["export", "missing.rec", "-o", "fight.glb"], 2),
+    (["metrics", "missing.rec"], 2),
+    (["metrics", "broken.toml"], 2),
+    (["info", "missing"], 2),
+    (["info", "broken.toml"], 2),
+    (["info", "missing.rec"], 2),
+    (["info", "missing.kumite"], 2),
+    (["info", ".", "--up-axis", "W"], 2),
+    (["info", ".", "--role", "nose=Nose"], 2),
+    (["build", "missing", "-o", "x.kumite"], 2),
+    (["build", ".", "-o", "x.kumite", "--layer", "none"], 2),
+    (["build", ".", "-o", "broken.toml/x"], 2),
+    (["segment", "missing"], 2),
+    (["likeness", "missing"], 2),
+    (["train", "missing"], 2),
+    (["spheres", "missing", "-o", "x.toml"], 2),
 ]
 
 
 def test_what_computes_nothing_imports_no_compiler(tmp_path: Path):
+    (tmp_path / "broken.toml").write_text(BROKEN, "utf-8")
     program = f"""
 import sys
 from kumite import cli
@@ -49,6 +90,7 @@ for command, expected in {QUICK!r}:
     )
     assert done.returncode == 0, done.stderr
     assert "sparring" in done.stdout and "unknown scene 'sparing'" in done.stderr
+    assert "unknown style 'bxer'" in done.stderr and "speed = [9, 3]" in done.stderr
 
 
 def test_a_scene_reads_its_own_file_only(monkeypatch):
@@ -147,3 +189,25 @@ def test_with_no_output_at_all_it_runs(tmp_path: Path):
     command = [sys.executable, "-c", program, "scenes", "--json"]
     done = subprocess.run(command, stderr=subprocess.PIPE, text=True)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is no signal to one process there")
+@pytest.mark.parametrize("module", ["typer", "kumite.cli.scenes", "pydantic", "numba"])
+def test_ctrl_c_while_it_imports_ends_it_without_a_traceback(tmp_path: Path, module: str):
+    program = f"""
+import sys
+class Interrupt:
+    def find_spec(self, name, path=None, target=None):
+        if name == {module!r}:
+            sys.meta_path.remove(self)
+            exec("import signal; signal.raise_signal(signal.SIGINT)")
+sys.meta_path.insert(0, Interrupt())
+sys.argv = ["kumite", "run", "sparring", "--seconds", "0.1"]
+from kumite import cli
+cli.main()
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert (done.returncode, done.stdout) == (130, "")
+    assert done.stderr.strip().splitlines()[-1] == "interrupted" and "Trace" not in done.stderr

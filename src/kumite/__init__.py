@@ -9,4 +9,4 @@ from kumite.lazy import names_of
 
 __version__ = "0.1.0"
 
-__getattr__, __dir__, __all__ = names_of(__name__, __file__)
+__getattr__, __dir__ = names_of(__name__, __file__)

@@ -10,12 +10,17 @@ from __future__ import annotations
 import numbers
 import operator
 from collections.abc import Iterable, Mapping, Sequence
+from math import inf, isfinite, nan
 from types import MappingProxyType
-from typing import Any, TypeVar
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from kumite.errors import KumiteError
+from kumite.lazy import Later
+
+if TYPE_CHECKING:
+    import numpy as np
+else:
+    np = Later("numpy")
 
 T = TypeVar("T")
 Size = int | str  # of one axis of an array; a letter stands for any, the same one everywhere
@@ -56,9 +61,9 @@ def number(
     value: object,
     what: str,
     *,
-    least: float = -np.inf,
-    most: float = np.inf,
-    above: float = -np.inf,
+    least: float = -inf,
+    most: float = inf,
+    above: float = -inf,
     unit: str = "",
 ) -> float:
     """A finite number, from least (or more than above) to most.
@@ -66,15 +71,15 @@ def number(
     Errors: no number, NaN, infinite, out of range.
     """
     try:
-        if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
+        if isinstance(value, bool) or not isinstance(value, numbers.Real):
             raise TypeError
         found = float(value)
     except (TypeError, ValueError, OverflowError):
-        found = np.nan
-    if not (np.isfinite(found) and least <= found <= most and found > above):
-        limits = [f"more than {above:g}"] if above > -np.inf else []
-        limits += [f"at least {least:g}"] if least > -np.inf else []
-        limits += [f"at most {most:g}"] if most < np.inf else []
+        found = nan
+    if not (isfinite(found) and least <= found <= most and found > above):
+        limits = [f"more than {above:g}"] if above > -inf else []
+        limits += [f"at least {least:g}"] if least > -inf else []
+        limits += [f"at most {most:g}"] if most < inf else []
         wanted = " ".join(["a number", " and ".join(limits), unit]).replace("  ", " ").strip()
         raise KumiteError(f"{what}: {shown(value)}; expected {wanted}")
     return found
@@ -83,7 +88,7 @@ def number(
 def whole(value: object, what: str, *, least: int | None = None, most: int | None = None) -> int:
     """A whole number, from least to most. Errors: no whole number; out of range."""
     try:
-        if isinstance(value, bool | np.bool_):
+        if isinstance(value, bool):
             raise TypeError
         found = operator.index(value)  # type: ignore[arg-type]
     except TypeError:

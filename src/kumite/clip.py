@@ -18,27 +18,27 @@ from kumite import checks, rotation
 from kumite.brief import brief, pictured
 from kumite.errors import KumiteError
 from kumite.kernels import pose as pose_kernels
+from kumite.roles import (
+    ARM_ROLES as ARM_ROLES,
+)
+from kumite.roles import (
+    LEG_ROLES as LEG_ROLES,
+)
+from kumite.roles import (
+    LIMBS as LIMBS,
+)
+from kumite.roles import (
+    REQUIRED_ROLES as REQUIRED_ROLES,
+)
+from kumite.roles import (
+    ROLES as ROLES,
+)
+from kumite.roles import (
+    SIDES as SIDES,
+)
 
 NO_PARENT = -1  # parents[0] of every skeleton
 MOST_FRAMES = 1_000_000  # of one resampled clip: more than two hours at 120 frames a second
-
-SIDES = ("left", "right")
-ARM_ROLES = ("clavicle", "upper_arm", "forearm", "hand")
-LEG_ROLES = ("thigh", "shin", "foot", "toe")
-ROLES = (
-    "pelvis",
-    "chest",
-    "neck",
-    "head",
-    *(f"{side}_{part}" for side in SIDES for part in (*ARM_ROLES, *LEG_ROLES)),
-)
-"""What a joint is for. A limb's joint carries the name of the segment that turns with it:
-``left_forearm`` is the elbow, ``left_hand`` the wrist, ``left_shin`` the knee."""
-REQUIRED_ROLES = tuple(
-    r for r in ROLES if r not in ("neck", *(f"{s}_{p}" for s in SIDES for p in ("clavicle", "toe")))
-)
-LIMBS = ("left_hand", "right_hand", "left_foot", "right_foot")
-"""The limbs that can strike, in the order of every [.., 4] limb array."""
 
 
 @brief

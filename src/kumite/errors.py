@@ -18,6 +18,12 @@ def at(path: Path | str, line: int | None, what: str) -> KumiteError:
     return KumiteError(f"{where}: {what}")
 
 
+def short(path: Path | str) -> str:
+    """A path as an error repeats it: not longer than a file system allows."""
+    text = str(path)
+    return text if len(text) <= 200 else text[:200] + "…"
+
+
 @contextlib.contextmanager
 def told_of(path: Path | str) -> Iterator[None]:
     """What is refused within is told as a fault of a file."""

@@ -18,17 +18,22 @@ import secrets
 import time
 import zlib
 from collections.abc import Iterator, Mapping
+from math import inf
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from safetensors import SafetensorError
-from safetensors.numpy import load as load_tensors
-from safetensors.numpy import save as save_tensors
+from typing import TYPE_CHECKING, Any
 
 from kumite.checks import is_control, shown
-from kumite.errors import KumiteError
+from kumite.errors import KumiteError, short
+from kumite.lazy import Later
 
+if TYPE_CHECKING:
+    import numpy as np
+    import safetensors
+    import safetensors.numpy as tensors
+else:
+    np, safetensors, tensors = map(Later, ("numpy", "safetensors", "safetensors.numpy"))
+
+LIBRARY, RECORDING = ("library", 6), ("recording", 2)  # kind and version
 META_KEY = "kumite"
 MOST_HEADER = 100_000_000  # bytes of a file's header: the most that safetensors reads
 MOST_VALUES = 20_000_000  # in it: each takes some 60 bytes of memory
@@ -162,13 +167,13 @@ def save(
         plain(header, "header")
     except KumiteError as error:
         raise KumiteError(f"{path}: cannot be written ({error})") from None
-    tensors = {k: np.ascontiguousarray(v) for k, v in sorted(arrays.items())}
+    stored = {k: np.ascontiguousarray(v) for k, v in sorted(arrays.items())}
     # One key: safetensors writes several in an order that changes from run to run.
     what = {"kind": kind, "version": version, "header": header}
-    what["crc32"] = _checksum(header, tensors)
+    what["crc32"] = _checksum(header, stored)
     meta = {META_KEY: json.dumps(what, sort_keys=True, allow_nan=False)}
     with writing(path) as temporary:
-        temporary.write_bytes(save_tensors(tensors, metadata=meta))
+        temporary.write_bytes(tensors.save(stored, metadata=meta))
 
 
 def plain(value: object, what: str, depth: int = 0) -> None:
@@ -185,7 +190,7 @@ def plain(value: object, what: str, depth: int = 0) -> None:
         if not -MOST_INTEGER <= value < MOST_INTEGER:
             raise KumiteError(f"{what}: a number of more than 64 bits")
     elif isinstance(value, float):
-        if value != value or value in (np.inf, -np.inf):
+        if value != value or value in (inf, -inf):
             raise KumiteError(f"{what}: {value}; expected a finite number")
     elif depth == DEEPEST:
         raise KumiteError(f"{what}: more than {DEEPEST} values within each other")
@@ -239,20 +244,55 @@ def kind_of(path: Path | str) -> str | None:
         return None
 
 
+def refuse_unreadable(path: Path | str, kind: str, version: int) -> None:
+    """Say now what a file's first bytes tell of why :func:`load` would not read it.
+
+    Errors: missing, not a file of ours, another kind of file, another version.
+    """
+    path = Path(path)
+    with _reading(path), path.open("rb") as file:
+        first = file.read(8)
+        size = min(int.from_bytes(first, "little"), MOST_HEADER + 1)
+        _head(path, first + file.read(min(size, os.fstat(file.fileno()).st_size)), kind, version)
+
+
 def load(path: Path | str, kind: str, version: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """The header and arrays of a file that :func:`save` wrote.
 
     Errors: missing, damaged, another kind of file, another version.
     """
     path = Path(path)
+    with _reading(path):
+        blob = path.read_bytes()
+    meta = _head(path, blob, kind, version)
+    try:
+        header = meta["header"]
+        if not isinstance(header, dict):
+            raise TypeError("its header is no table")
+        plain(header, "header")
+        arrays = tensors.load(blob)
+    except (safetensors.SafetensorError, *_NO_META) as error:
+        raise KumiteError(f"{path}: damaged {kind} ({error})") from None
+    if _checksum(header, arrays) != meta.get("crc32"):
+        raise KumiteError(f"{path}: damaged {kind} (its content does not fit its checksum)")
+    return header, arrays
+
+
+@contextlib.contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    """What the system says of a path, in a sentence. Errors: a folder, pipe or device."""
     try:
         if path.exists() and not path.is_file():
             raise KumiteError(f"{path}: cannot be read (not a file)")
-        blob = path.read_bytes()
+        yield
     except OSError as error:
-        raise KumiteError(f"{path}: cannot be read ({error.strerror or error})") from None
+        raise KumiteError(f"{short(path)}: cannot be read ({error.strerror or error})") from None
     except ValueError:  # a NUL
         raise KumiteError(f"{shown(str(path))}: not a path") from None
+
+
+def _head(path: Path, blob: bytes, kind: str, version: int) -> dict[str, Any]:
+    """What :func:`save` says of the arrays. Errors: it is none of ours, or not the one wanted."""
     try:
         size = int.from_bytes(blob[:8], "little")
         if size > MOST_HEADER:
@@ -270,17 +310,7 @@ def load(path: Path | str, kind: str, version: int) -> tuple[dict[str, Any], dic
             f"{path}: {kind} of version {shown(number)}; this Kumite reads version {version}: "
             "build it again"
         )
-    try:
-        header = meta["header"]
-        if not isinstance(header, dict):
-            raise TypeError("its header is no table")
-        plain(header, "header")
-        arrays = load_tensors(blob)
-    except (SafetensorError, *_NO_META) as error:
-        raise KumiteError(f"{path}: damaged {kind} ({error})") from None
-    if _checksum(header, arrays) != meta.get("crc32"):
-        raise KumiteError(f"{path}: damaged {kind} (its content does not fit its checksum)")
-    return header, arrays
+    return meta
 
 
 def code_digest(*modules: str) -> str:

@@ -4,4 +4,4 @@ without hand work; and how like a person they move.
 
 from kumite.lazy import names_of
 
-__getattr__, __dir__, __all__ = names_of(__name__, __file__)
+__getattr__, __dir__ = names_of(__name__, __file__)

@@ -2,77 +2,47 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
-import sys
-from io import BufferedWriter, FileIO, TextIOWrapper
-from typing import Any
+import signal
+import threading
 
-from kumite.cli import motion, scenes, segment, train  # noqa: F401 - they add their commands
-from kumite.cli.app import app, err
-from kumite.errors import KumiteError
+INTERRUPTED = 130  # the status of a process that Ctrl-C has ended
 
-OUTPUT = "standard output"
+TYPE_CHECKING = False  # typing itself would have to be imported first
+if TYPE_CHECKING:
+    from typing import Any
 
 
 def main() -> None:
     """Run the command line; bad input ends with one line on stderr and status 2."""
-    _name_output()
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):  # a terminal without "→" gets "?"
-            stream.reconfigure(errors="replace")
+    before = signal.getsignal(signal.SIGINT)
+    in_main = threading.current_thread() is threading.main_thread()
+    ours = in_main and before is signal.default_int_handler  # else ignored, or another's
+    if ours:
+        signal.signal(signal.SIGINT, _end_at_once)
     try:
-        try:
-            app()
-        finally:
-            if sys.stdout is not None:
-                sys.stdout.flush()  # what fails at the end of Python is a traceback
-    except KumiteError as error:
-        reason = str(error)
-    except MemoryError:
-        reason = "not enough memory; fewer files, a lower rate or a shorter time takes less"
-    except BrokenPipeError:  # nobody reads on: "kumite scenes | head -1"
-        _close_output()
-        sys.exit(1)
-    except OSError as error:
-        what = error.strerror or str(error)
-        if error.filename == OUTPUT:
-            reason = f"cannot write to {OUTPUT} ({what})"
-            _close_output()
-        else:
-            reason = what if error.filename is None else f"{error.filename}: {what}"
-    else:
-        return
-    with contextlib.suppress(OSError):
-        err.print(f"error: {reason}", markup=False, highlight=False)
-    sys.exit(2)
+        from kumite.cli.start import start
+
+        start()
+    except SystemExit as end:
+        if end.code == INTERRUPTED:
+            exec("")  # where Ctrl-C came within an exec, Python would end by a signal all the same
+        raise
+    finally:
+        if ours:
+            signal.signal(signal.SIGINT, before)
 
 
-class _Output(FileIO):
-    def write(self, data: Any) -> int | None:
-        try:
-            return super().write(data)
-        except OSError as error:
-            error.filename = OUTPUT
-            raise
+def begin() -> None:
+    """From now on there is work, which Ctrl-C interrupts; until now it ended the process at once.
+
+    While the command line itself is imported there is nothing to be kept, and an interrupt would be
+    a traceback, or be taken for a package that is broken.
+    """
+    if signal.getsignal(signal.SIGINT) is _end_at_once:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def _name_output() -> None:
-    """From now on errors of standard output say that it is what fails."""
-    plain = sys.stdout
-    if type(plain) is not TextIOWrapper:  # none, or a test's
-        return
-    if type(getattr(plain.buffer, "raw", plain.buffer)) is FileIO:  # no console of Windows
-        output = BufferedWriter(_Output(plain.fileno(), "wb", closefd=False))
-        sys.stdout = TextIOWrapper(
-            output,
-            plain.encoding,
-            line_buffering=plain.line_buffering,
-            write_through=plain.write_through,
-        )
-
-
-def _close_output() -> None:
-    """Send what is left nowhere, or Python would fail on it once more as it ends."""
-    with contextlib.suppress(OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+def _end_at_once(number: int, frame: Any) -> None:
+    os.write(2, b"interrupted\n")
+    os._exit(INTERRUPTED)

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-INTERRUPTED = 130  # the status of a process that Ctrl-C has ended
+from kumite.cli import INTERRUPTED, begin
 
 
 class App(typer.Typer):
@@ -40,6 +40,7 @@ def _shared(function: Callable) -> Callable:
     def run(*args: Any, quiet: bool, **given: Any) -> None:
         settings.quiet = settings.quiet or quiet
         try:
+            begin()
             function(*args, **given)
         except KeyboardInterrupt:
             err.print("interrupted", highlight=False)

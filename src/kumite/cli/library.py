@@ -28,9 +28,15 @@ def is_library(source: Path | str) -> bool:
     if not os.path.isfile(source):  # noqa: PTH113 - Path.is_file raises on names that are too long
         return False
     from kumite import files
-    from kumite.graph.library_file import KIND
 
-    return files.kind_of(source) == KIND
+    return files.kind_of(source) == files.LIBRARY[0]
+
+
+def refuse_no_library(path: Path | str) -> None:
+    """Say what a file is instead of a library before anything is imported that computes."""
+    from kumite import files
+
+    files.refuse_unreadable(path, *files.LIBRARY)
 
 
 def library_values(library: Library) -> dict[str, Any]:
@@ -239,10 +245,11 @@ def _ranges(library: Layer) -> list[tuple[int, int]]:
 
 def show_library(path: Path | str, plot: Path | None, as_json: bool, given: list[str]) -> None:
     """``kumite info`` of a library. given: options that say how to read motion capture."""
-    from kumite.graph import load_library
-
     if given:
         raise KumiteError(f"{given[0]}: of motion capture; {path} is a library")
+    refuse_no_library(path)
+    from kumite.graph import load_library
+
     library = load_library(path)
     if plot is not None:
         from kumite.export.plot import plot_hits

@@ -13,6 +13,7 @@ from kumite.cli.library import (
     is_library,
     library_lines,
     library_values,
+    refuse_no_library,
     show_library,
     worth_table,
 )
@@ -51,9 +52,6 @@ def info(
 
     Ends with status 3 if some of the files cannot be read, 2 if none can.
     """
-    from kumite.annotate import Strikes, find_strikes
-    from kumite.clip import LIMBS, check, concatenate
-
     given = [*([] if fps is None else ["--fps"]), *reading.given()]
     if len(source) == 1 and is_library(source[0]):
         show_library(source[0], plot, as_json, given)
@@ -61,6 +59,10 @@ def info(
     if len(source) == 1 and is_recording(source[0]):
         show_recording(source[0], as_json, [*([] if plot is None else ["--plot"]), *given])
         return
+    reading.refuse(source, fps)
+    from kumite.annotate import Strikes, find_strikes
+    from kumite.clip import LIMBS, check, concatenate
+
     loaded = reading.load(source, fps, skip_bad=True)
     hits: dict[str, dict[str, int]] = {}
     every: list[Strikes] = []
@@ -221,12 +223,15 @@ def build(
 ) -> None:
     """Build a library: clips, contacts, effective hits and the motion graph, in one file."""
     from kumite.files import refuse_unwritable
-    from kumite.graph import LAYERS, JoinBound, build_library, save_library
 
-    bound = JoinBound(**_given(height=join_height, angle=join_angle, speed=join_speed))
     if most is not None and actions is not None:
         raise KumiteError("--most: of targets that are found; expected none with --actions")
+    from kumite.layers import LAYERS
+
     wanted = tuple(layer) if layer else LAYERS
+    for name in wanted:
+        if name not in LAYERS:
+            raise unknown("layer", name, LAYERS)
     options = _options_of_layers(
         wanted,
         {
@@ -246,6 +251,10 @@ def build(
             "--actions: of other layers; expected none with --layer frames without --avoidance"
         )
     refuse_unwritable(output)  # before the work, not after
+    reading.refuse(source, fps)
+    from kumite.graph import JoinBound, build_library, save_library
+
+    bound = JoinBound(**_given(height=join_height, angle=join_angle, speed=join_speed))
     loaded = reading.load(source, fps, skip_bad=skip_bad)
     with progress() as bars:
         stages, clips = Stages(bars), loaded.clip_set()
@@ -432,12 +441,14 @@ def likeness(
     reading: Reading,
 ) -> None:
     """How like a person clips move: joints, foot skate, balance, blows and steps, side by side."""
+    if not source and not style:
+        raise KumiteError("name motion capture files, or a --style of the built-in performer")
+    if source:
+        reading.refuse(source)
     from kumite.annotate import measure_likeness
     from kumite.clip import concatenate
     from kumite.performer import perform as perform_style
 
-    if not source and not style:
-        raise KumiteError("name motion capture files, or a --style of the built-in performer")
     found = {}
     if source:
         loaded = reading.load(source, skip_bad=skip_bad)
@@ -468,11 +479,13 @@ def spheres(
     output: Annotated[Path, typer.Option("--output", "-o", help="The TOML file to write.")],
 ) -> None:
     """Write the spheres that stand for the body when it avoids: to edit, for [dodge] spheres."""
-    from kumite.body import lay_spheres, save_spheres
     from kumite.files import refuse_unwritable
-    from kumite.graph import load_library
 
     refuse_unwritable(output)
+    refuse_no_library(library)
+    from kumite.body import lay_spheres, save_spheres
+    from kumite.graph import load_library
+
     skeleton = load_library(library).clips.skeleton
     laid = lay_spheres(skeleton)
     save_spheres(output, laid, skeleton)

@@ -73,6 +73,16 @@ class Reading:
             if getattr(self, f.name) != f.default
         ]
 
+    def refuse(self, source: Sequence[str], fps: float | None = None) -> None:
+        """Say now what needs no reading. Errors: of the options; nothing there to be read."""
+        from kumite.mocap.sources import check_options, find_files
+
+        said = {f.name: getattr(self, f.name) for f in fields(self)}
+        for name in ("role", "encoding", "keep_t_pose"):
+            del said[name]
+        check_options(fps=fps, roles=_roles(self.role), **said)
+        find_files(source)
+
     def load(
         self, source: Sequence[str], fps: float | None = None, *, skip_bad: bool = False
     ) -> Loaded:

@@ -21,17 +21,24 @@ def is_recording(source: Path | str) -> bool:
     if not os.path.isfile(source):  # noqa: PTH113 - Path.is_file raises on names that are too long
         return False
     from kumite import files
-    from kumite.scene.recording import KIND
 
-    return files.kind_of(source) == KIND
+    return files.kind_of(source) == files.RECORDING[0]
+
+
+def refuse_no_recording(path: Path | str) -> None:
+    """Say what a file is instead of a recording before anything is imported that computes."""
+    from kumite import files
+
+    files.refuse_unreadable(path, *files.RECORDING)
 
 
 def show_recording(path: Path | str, as_json: bool, given: list[str]) -> None:
     """``kumite info`` of a recording. given: options that are of something else."""
-    from kumite.scene import load_recording
-
     if given:
         raise KumiteError(f"{given[0]}: of motion capture; {path} is a recording")
+    refuse_no_recording(path)
+    from kumite.scene import load_recording
+
     r = load_recording(path)
     kinds = dict(Counter(e.kind for e in r.events).most_common())
     seed, library = r.settings.get("seed"), r.settings.get("library")

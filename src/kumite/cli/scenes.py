@@ -14,11 +14,13 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
+from kumite.cli import INTERRUPTED
 from kumite.cli.ahead import Wanted, is_cold, prepare
-from kumite.cli.app import INTERRUPTED, JsonOption, app, err, out, print_json
+from kumite.cli.app import JsonOption, app, err, out, print_json
 from kumite.cli.complete import complete_scene, complete_shown
-from kumite.cli.library import is_library
+from kumite.cli.library import is_library, refuse_no_library
 from kumite.cli.progress import Compiling, Stages, Training, progress, say
+from kumite.cli.recording import refuse_no_recording
 from kumite.cli.report import show_metrics
 from kumite.errors import KumiteError, unknown
 from kumite.scene import catalogue
@@ -88,6 +90,8 @@ def live_scene(wanted: Wanted) -> Any:
 
 def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
     """A scene ready to run: library read or performed, policies trained or found."""
+    if library is not None:
+        refuse_no_library(library)
     from kumite.control import cache_folder
     from kumite.graph import builtin_layer, load_library
     from kumite.scene import BoutScene, DodgeScene, EvasionScene, LiveScene, PrepareScene
@@ -168,7 +172,7 @@ def run(
     for path in output or []:  # before any long work: what is wrong is said at once
         _exporter(path)
     settings = _settings(scene, count, throws)
-    from kumite.scene import measure, record, seconds_to_throw, throws_within
+    from kumite.scene import seconds_to_throw, throws_within
 
     if seconds is None:
         seconds = SECONDS if throws is None else max(SECONDS, seconds_to_throw(settings))
@@ -182,6 +186,8 @@ def run(
     )
     _check_outputs(output or [], [*everyone, *(["the crowd"] if settings.crowd else [])])
     live = _live_scene(settings, library, seed)
+    from kumite.scene import measure, record
+
     with progress() as bars, _asked_to_stop() as asked:
         bar = bars.add(f"running {scene}", total=1.0)
         recording = record(live, seconds, lambda share: bars.update(bar, share), asked.is_set)
@@ -233,6 +239,7 @@ def metrics(
     recording: Annotated[Path, typer.Argument(help="A .rec file.")], as_json: JsonOption = False
 ) -> None:
     """Figures of a recording: what it is about (blows, balls, errands, …), and how all move."""
+    refuse_no_recording(recording)
     from kumite.scene import load_recording, measure
 
     show_metrics(measure(load_recording(recording)), as_json)
@@ -297,6 +304,7 @@ def export(
     """Write a recording as GLB (all characters), BVH (one of them) or a contact sheet."""
     for path in output:
         _exporter(path)  # a wrong ending is said before anything heavy is imported
+    refuse_no_recording(recording)
     from kumite.scene import load_recording
 
     loaded = load_recording(recording)
@@ -363,6 +371,8 @@ def studio(
 
 def _shown_first(wanted: Wanted) -> tuple[Any, Any]:
     """What the studio shows, and what is prepared meanwhile where nothing is compiled yet."""
+    if wanted.library is not None:
+        refuse_no_library(wanted.library)
     if _is_played(wanted.scene) or not is_cold(wanted):
         return _stage(*wanted), None
     from kumite.studio import Coming, Interlude
@@ -381,14 +391,18 @@ def _stage(
     """What the studio is to show."""
     if not _is_played(scene):
         return _live_scene(_settings(scene, count, throws), library, seed)
-    from kumite.graph import load_library
-    from kumite.scene import ActionPlayback, Playback, load_recording
-
     if scene.endswith(".rec"):
+        refuse_no_recording(scene)
+        from kumite.scene import Playback, load_recording
+
         return Playback(load_recording(scene))
     for name, value in (("--library", library), ("--count", count), ("--throws", throws)):
         if value is not None:
             raise KumiteError(f"{name}: of a scene; {scene} is a library, whose actions are played")
+    refuse_no_library(scene)
+    from kumite.graph import load_library
+    from kumite.scene import ActionPlayback
+
     return ActionPlayback(load_library(scene).layer("actions"))
 
 

@@ -40,16 +40,19 @@ def segment(
     reading: Reading,
 ) -> None:
     """Cut clips into actions: a text file to edit. Run it again as often as you like."""
-    from kumite.annotate import find_actions, find_avoidance, find_contacts, find_strikes
-    from kumite.annotate.action_file import check, merge, parse, to_lines, write
-    from kumite.clip import Clip, concatenate
     from kumite.files import refuse_unwritable
-    from kumite.performer import Truth
-    from kumite.performer import perform as perform_style
 
     if bool(source) == (style is not None):
         raise KumiteError("name motion capture files, or a --style of the built-in performer")
     refuse_unwritable(output)
+    if source:
+        reading.refuse(source, fps)
+    from kumite.annotate import find_actions, find_avoidance, find_contacts, find_strikes
+    from kumite.annotate.action_file import check, merge, parse, to_lines, write
+    from kumite.clip import Clip, concatenate
+    from kumite.performer import Truth
+    from kumite.performer import perform as perform_style
+
     known = parse(output) if output.exists() else None  # before the work, not after
     truth: dict[str, Truth] = {}
     groups: list[list[Clip]] = []

@@ -8,7 +8,9 @@ from typing import Annotated
 
 import typer
 
-from kumite.cli.app import INTERRUPTED, JsonOption, app, err, out, print_json
+from kumite.cli import INTERRUPTED
+from kumite.cli.app import JsonOption, app, err, out, print_json
+from kumite.cli.library import refuse_no_library
 from kumite.cli.progress import Stages, progress
 
 
@@ -47,13 +49,16 @@ def train(
     as_json: JsonOption = False,
 ) -> None:
     """Learn how to approach a goal and prepare on the way. Ctrl-C keeps what is learned."""
-    from kumite.control import PreparationSettings, cache_folder, gradual
-    from kumite.control.approaching import STEER, trained_approach
     from kumite.files import refuse_unwritable
-    from kumite.graph import builtin_layer, load_library
 
     if plot is not None:
         refuse_unwritable(plot)  # before the work, not after
+    if library is not None:
+        refuse_no_library(library)
+    from kumite.control import PreparationSettings, cache_folder, gradual
+    from kumite.control.approaching import STEER, trained_approach
+    from kumite.graph import builtin_layer, load_library
+
     settings = PreparationSettings() if printed else gradual()
     folder = cache_folder(library)
     turns = STEER if steer is None else tuple(map(radians, steer))

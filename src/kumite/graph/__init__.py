@@ -22,12 +22,13 @@ from kumite.graph.hierarchy import (
 )
 from kumite.graph.joins import JoinBound, JoinMeter, Jumps
 from kumite.graph.layer import Layer, build_frames
-from kumite.graph.library import LAYERS, Library, build_library
+from kumite.graph.library import Library, build_library
 from kumite.graph.library_file import load_library, save_library
 from kumite.graph.preparing import Preparing
 from kumite.graph.table import ActionTable, fold
 from kumite.graph.transitions import Transitions, find_transitions, strongest_component
 from kumite.graph.whole import build_actions
+from kumite.layers import LAYERS
 
 __all__ = [
     "LAYERS",

@@ -18,9 +18,10 @@ from kumite.graph.avoiding import build_avoidance
 from kumite.graph.errands import build_preparation
 from kumite.graph.hierarchy import authored_targets
 from kumite.graph.layer import Layer, build_frames
-from kumite.graph.library import LAYERS, Library, build_library
+from kumite.graph.library import Library, build_library
 from kumite.graph.library_file import load_library, save_library
 from kumite.graph.whole import build_actions
+from kumite.layers import LAYERS
 
 FPS = 60.0
 ALL = "all"  # a style of all of these:

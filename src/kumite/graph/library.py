@@ -18,8 +18,7 @@ from kumite.graph.errands import build_preparation
 from kumite.graph.joins import JoinBound
 from kumite.graph.layer import Layer, build_frames
 from kumite.graph.whole import build_actions
-
-LAYERS = ("frames", "actions", "avoidance", "preparation")
+from kumite.layers import LAYERS
 
 
 @brief

@@ -19,7 +19,7 @@ from kumite.graph.library import Library
 from kumite.graph.preparing import Preparing
 from kumite.graph.table import ActionTable
 
-KIND, VERSION = "library", 6
+KIND, VERSION = files.LIBRARY
 
 
 def save_library(path: Path | str, library: Library | Layer) -> None:

@@ -7,7 +7,6 @@ which beats what the file states, which beats inference.
 
 from __future__ import annotations
 
-import glob
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,21 +15,19 @@ from typing import Any, Literal
 import numpy as np
 
 from kumite.brief import brief
-from kumite.clip import ROLES, Clip, ClipSet, concatenate, resample
-from kumite.errors import KumiteError, unknown
+from kumite.clip import Clip, ClipSet, concatenate, resample
+from kumite.errors import KumiteError
 from kumite.mocap import infer
 from kumite.mocap.asfamc import AsfSkeleton, read_amc, read_asf
 from kumite.mocap.bvh import read_bvh
-from kumite.mocap.raw import UP_AXES, RawMotion, to_clip
+from kumite.mocap.raw import RawMotion, to_clip
 from kumite.mocap.rigid import fixed_bones
 from kumite.mocap.roles import find_roles
-from kumite.mocap.settings import JOINT_POSITIONS, SettingsTree
-from kumite.mocap.text import short
+from kumite.mocap.settings import SettingsTree
+from kumite.mocap.sources import Source, check_options, find_files
 from kumite.mocap.trim import without_apart
 
-SUFFIXES = (".bvh", ".amc")
 How = Literal["given", "settings", "stated", "inferred", "assumed"]
-Source = str | Path | Sequence[str | Path]
 MOST_STRETCH = 0.03  # m; bones of one length may take a joint so far from where the file has it
 _MOST_PROBLEMS = 20  # shown of a folder that cannot be read
 
@@ -181,29 +178,20 @@ def load(
 
     Errors: nothing to load, and everything that is wrong with any of the files, at once.
     """
-    if up_axis is not None:
-        up_axis = up_axis.upper()
-        if up_axis not in UP_AXES:
-            raise KumiteError(f"up axis {up_axis!r}; expected one of {', '.join(UP_AXES)}")
-    for what, number in (
-        ("fps", fps),
-        ("file_fps", file_fps),
-        ("metres_per_unit", metres_per_unit),
-    ):
-        if number is not None and not (np.isfinite(number) and number > 0):
-            raise KumiteError(f"{what} {number}; expected a number more than 0")
-    if ground is not None and not np.isfinite(ground):
-        raise KumiteError(f"ground {ground}; expected a height in metres")
-    for role in roles or {}:
-        if role not in ROLES:
-            raise unknown("role", role, ROLES)
-    if joint_positions is not None and joint_positions not in JOINT_POSITIONS:
-        raise unknown("joint_positions", joint_positions, JOINT_POSITIONS)
+    check_options(
+        fps=fps,
+        file_fps=file_fps,
+        metres_per_unit=metres_per_unit,
+        up_axis=up_axis,
+        ground=ground,
+        roles=roles,
+        joint_positions=joint_positions,
+    )
     given = {
         "fps": fps,
         "file_fps": file_fps,
         "metres_per_unit": metres_per_unit,
-        "up_axis": up_axis,
+        "up_axis": None if up_axis is None else up_axis.upper(),
         "ground_height": ground,
         "encoding": encoding,
         "joint_positions": joint_positions,
@@ -286,54 +274,6 @@ def _raise(bad: Sequence[BadFile], *, some_good: bool) -> None:
 
 
 # Finding -----------------------------------------------------------------------------------------
-
-
-def find_files(source: Source) -> list[tuple[Path, Path]]:
-    """Mocap files of a source, each with the folder up to which ``kumite.toml`` is looked for.
-
-    Errors: a path or glob that leads nowhere, a folder without mocap, a file of another kind.
-    """
-    if not isinstance(source, (str, Path)):
-        found: dict[Path, Path] = {}
-        for one in source:
-            for path, top in find_files(one):
-                found.setdefault(path, top)
-        if not found:
-            raise KumiteError("an empty list of files; expected .bvh or .amc files")
-        return list(found.items())
-    if not str(source):  # an unset variable of a shell; Path("") would be the current folder
-        raise KumiteError("an empty name; expected a folder, a glob or a file")
-    path = Path(source)
-    try:
-        is_folder, exists = path.is_dir(), path.exists()
-    except (OSError, ValueError):
-        raise KumiteError(f"{short(path)!r}: not a path") from None
-    if is_folder:
-        files = sorted(p for p in path.rglob("*") if _is_mocap(p))
-        if not files:
-            raise KumiteError(f"{path}: no mocap in this folder; expected .bvh or .amc files")
-        return [(p, path) for p in files]
-    if exists:
-        if path.suffix.lower() not in SUFFIXES:
-            raise KumiteError(f"{path}: not a mocap file; expected {' or '.join(SUFFIXES)}")
-        return [(path, path.parent)]
-    if glob.has_magic(str(path)):
-        matches = sorted(Path(p) for p in glob.glob(str(path), recursive=True))  # noqa: PTH207
-        files = [p for p in matches if _is_mocap(p)]
-        if not files:
-            raise KumiteError(f"{path}: matches no mocap; expected .bvh or .amc files")
-        return [(p, p.parent) for p in files]
-    raise KumiteError(f"{short(path)}: no such file or folder")
-
-
-def _is_mocap(path: Path) -> bool:
-    # Hidden files are not takes: editors, downloads and our own writing leave such behind.
-    if path.suffix.lower() not in SUFFIXES or path.name.startswith("."):
-        return False
-    try:
-        return path.is_file()
-    except OSError:  # in a folder that may not be entered
-        return False
 
 
 def find_asf(amc: Path) -> Path:

@@ -11,6 +11,7 @@ import numpy as np
 from kumite import rotation
 from kumite.clip import Clip, Skeleton
 from kumite.errors import KumiteError
+from kumite.mocap.sources import UP_AXES
 
 MOST_JOINTS = 2000  # of a skeleton: a person with fingers and face has some 300
 MOST_CHARACTERS = 200  # of a joint's name
@@ -26,7 +27,6 @@ _TO_Y = {
     "-Z": rotation.from_axis_angle(_X, _QUARTER),
     "-X": rotation.from_axis_angle(_Z, -_QUARTER),
 }
-UP_AXES = tuple(_TO_Y)  # the usual first
 
 
 SAY_RATE = "--file-fps, or file_fps in kumite.toml"

@@ -28,12 +28,10 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from kumite import toml
-from kumite.clip import ROLES
-from kumite.errors import KumiteError, at
-from kumite.mocap.text import short
+from kumite.errors import KumiteError, at, short
+from kumite.roles import ROLES
 
 FILE_NAME = "kumite.toml"
-JOINT_POSITIONS = ("channels", "offsets")
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 

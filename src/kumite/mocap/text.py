@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kumite.errors import KumiteError, at
+from kumite.errors import KumiteError, at, short
 from kumite.kernels import parse
 
 LARGEST = 1e9  # a length or angle beyond this is damage, and its square would overflow further on
@@ -116,12 +116,6 @@ def decode(path: Path, data: bytes, line: int = 1) -> str:
         raise at(
             path, line, f"byte 0x{data[error.start]:02x} is not UTF-8; expected a UTF-8 text file"
         ) from None
-
-
-def short(path: Path | str) -> str:
-    """A path as an error repeats it: not longer than a file system allows."""
-    text = str(path)
-    return text if len(text) <= 200 else text[:200] + "…"
 
 
 def shown(token: str | bytes) -> str:

@@ -18,8 +18,7 @@ from kumite.clip import Clip, Skeleton
 from kumite.errors import KumiteError, unknown
 from kumite.scene.told import check_event, check_settings, check_whole
 
-KIND = "recording"
-VERSION = 2
+KIND, VERSION = files.RECORDING
 NO_FRAME = -1  # library_frame of a pose that is no captured frame
 
 
