@@ -20,7 +20,7 @@ from kumite.cli.library import (
 from kumite.cli.progress import Bars, Stages, progress
 from kumite.cli.reading import FpsOption, Reading, SkipBad, Source, reads_mocap
 from kumite.cli.recording import is_recording, show_recording
-from kumite.errors import KumiteError
+from kumite.errors import KumiteError, unknown
 
 if TYPE_CHECKING:
     from kumite.mocap import Loaded
