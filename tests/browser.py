@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import io
 import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
+from unittest.mock import patch
 from urllib.parse import urlparse
 
 import numpy as np
 import pytest
+import viser
 from PIL import Image
 
+from kumite.studio import Studio
+from kumite.studio import studio as studio_loop
+from tests.stranger import running
+
 if TYPE_CHECKING:
-    import viser
-    from playwright.sync_api import Page
+    from playwright.sync_api import Browser, Page
 
 CHROMIUM = Path("/usr/bin/chromium")
 SIZE = (900, 600)
@@ -35,6 +42,26 @@ ARGUMENTS = (
     "--disable-sync",
     "--disable-dev-shm-usage",
 )
+# Without a graphics card a picture costs half a second of computing. What a test looks for is seen
+# as well in ten pictures a second of half the resolution, without smooth edges and shadows.
+PLAIN = """
+const draw = window.requestAnimationFrame.bind(window), waiting = new Set();
+let last = 0;
+window.requestAnimationFrame = then => {
+  const id = setTimeout(() => draw(t => {
+    if (waiting.delete(id)) { last = t; then(t); }
+  }), Math.max(0, last + 100 - performance.now()));
+  waiting.add(id);
+  return id;
+};
+window.cancelAnimationFrame = id => waiting.delete(id);
+const open = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function (kind, options) {
+  return open.call(this, kind, {...options, antialias: false});
+};
+"""
+HALF = "?fixedDpr=0.5"
+PICTURES = 10.0  # a second, that a studio sends
 HARMLESS = (
     "GPU stall",
     "GL Driver Message",
@@ -63,39 +90,96 @@ def need_chromium() -> None:
     pytest.skip(f"{CHROMIUM} is missing")
 
 
-@contextlib.contextmanager
-def open_page(url: str, size: tuple[int, int] = SIZE) -> Iterator[tuple[Page, Traffic]]:
-    """A headless page of ``size`` (width, height) px at ``url``, and what it asked for."""
+@cache
+def _chromium() -> Browser:
+    """The browser that all tests of a process share; each has pages of its own."""
     from playwright.sync_api import sync_playwright
 
+    playwright = sync_playwright().start()
+    browser = playwright.chromium.launch(
+        executable_path=str(CHROMIUM), headless=True, args=list(ARGUMENTS)
+    )
+    atexit.register(playwright.stop)
+    atexit.register(browser.close)
+    return browser
+
+
+@contextlib.contextmanager
+def open_page(
+    url: str, size: tuple[int, int] = SIZE, *, plain: bool = True
+) -> Iterator[tuple[Page, Traffic]]:
+    """A headless page of ``size`` (width, height) px at ``url``, and what it asked for.
+
+    plain: drawn as seldom and as simply as a test needs.
+    """
     traffic = Traffic()
 
     def came(payload: str | bytes) -> None:
         traffic.websocket_frames += 1
         traffic.websocket_bytes += len(payload)
 
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=str(CHROMIUM), headless=True, args=list(ARGUMENTS)
-        )
-        page = browser.new_page(viewport={"width": size[0], "height": size[1]})
-        page.on("request", lambda r: traffic.hosts.add(urlparse(r.url).hostname or ""))
-        page.on("websocket", lambda w: traffic.hosts.add(urlparse(w.url).hostname or ""))
-        page.on("websocket", lambda w: w.on("framereceived", came))
-        page.on("pageerror", lambda e: traffic.errors.append(str(e)))
-        page.on(
-            "console",
-            lambda m: (
-                traffic.errors.append(m.text)
-                if m.type == "error" and not any(h in m.text for h in HARMLESS)
-                else None
-            ),
-        )
-        page.goto(url)
-        try:
-            yield page, traffic
-        finally:
-            browser.close()
+    page = _chromium().new_page(viewport={"width": size[0], "height": size[1]})
+    if plain:
+        page.add_init_script(PLAIN)
+    page.on("request", lambda r: traffic.hosts.add(urlparse(r.url).hostname or ""))
+    page.on("websocket", lambda w: traffic.hosts.add(urlparse(w.url).hostname or ""))
+    page.on("websocket", lambda w: w.on("framereceived", came))
+    page.on("pageerror", lambda e: traffic.errors.append(str(e)))
+    page.on(
+        "console",
+        lambda m: (
+            traffic.errors.append(m.text)
+            if m.type == "error" and not any(h in m.text for h in HARMLESS)
+            else None
+        ),
+    )
+    page.goto(url)
+    try:
+        yield page, traffic
+    finally:
+        page.close()
+
+
+@contextlib.contextmanager
+def seen(studio: Studio, url: str = "") -> Iterator[tuple[Page, viser.ClientHandle]]:
+    """A studio that runs, seen in a page at its own or another ``url``; the server's side of it.
+
+    At the end nothing has gone wrong in the page, and it asked for nothing from elsewhere.
+    """
+    url = url or studio.url
+    lamp = studio.server.scene._handle_from_node_name["/light/key"]
+    assert isinstance(lamp, viser.DirectionalLightHandle)
+    lamp.cast_shadow = False
+    with (
+        patch.object(studio_loop, "MOST_DRAWN", PICTURES),
+        open_page(url + HALF) as (page, traffic),
+    ):
+        client = client_of(studio.server, page)
+        page.wait_for_selector("canvas")
+        let_draw(page)
+        close_notes(page)
+        yield page, client
+        assert traffic.errors == []
+        assert traffic.hosts <= {urlparse(url).hostname, ""}
+
+
+@contextlib.contextmanager
+def watching(studio: Studio) -> Iterator[tuple[Page, viser.ClientHandle]]:
+    """The same of a studio that runs no longer than it is seen."""
+    need_chromium()
+    with running(studio), seen(studio) as (page, client):
+        yield page, client
+
+
+def let_draw(page: Page, pictures: int = 4) -> None:
+    """Wait until the page has drawn as often."""
+    page.evaluate(
+        """count => new Promise(done => {
+            const next = () => count-- > 0 ? requestAnimationFrame(next) : done();
+            next();
+        })""",
+        pictures,
+    )
 
 
 def wait_until(page: Page, condition: Callable[[], bool], what: str, seconds: float = 30.0) -> None:
@@ -111,7 +195,7 @@ def close_notes(page: Page) -> None:
     """Close what the viewer says of a browser without a graphics card: it hides the scene."""
     for button in page.locator(".mantine-Notification-closeButton").all():
         button.click()
-    page.wait_for_timeout(400)
+    page.wait_for_function("() => !document.querySelector('.mantine-Notification-root')")
 
 
 def picture(page: Page) -> np.ndarray:
@@ -123,7 +207,7 @@ def save_picture(
     url: str, path: Path, size: tuple[int, int] = (1280, 800), wait: float = 6
 ) -> None:
     """A picture of a running studio for the documentation, ``wait`` seconds after it appears."""
-    with open_page(url, size) as (page, _):
+    with open_page(url, size, plain=False) as (page, _):
         page.wait_for_selector("canvas")
         page.wait_for_timeout(wait * 1000)
         close_notes(page)
@@ -162,7 +246,7 @@ def project(point: np.ndarray, camera: viser.CameraHandle, page: Page) -> tuple[
 def drag(page: Page, start: tuple[float, float], end: tuple[float, float], steps: int = 8) -> None:
     """Press at ``start``, move to ``end`` and let go; px on the page."""
     page.mouse.move(*start)
-    page.wait_for_timeout(700)  # a gizmo takes the pointer only after a frame with it on the handle
+    let_draw(page)  # a gizmo takes the pointer only after a frame with it on the handle
     page.mouse.down()
     for i in range(1, steps + 1):
         t = i / steps

@@ -371,10 +371,7 @@ def test_a_hostile_page_in_the_same_browser_can_do_nothing(elsewhere):
                 page.wait_for_timeout(1000)  # for what a frame might still do
                 assert page.evaluate("() => window.found") == CAME_OF_IT
                 assert not studio.server.get_clients()
-            with browser.open_page(own) as (page, traffic):
-                browser.client_of(studio.server, page)
-                page.wait_for_selector("canvas")
-                browser.close_notes(page)
+            with browser.seen(studio, own) as (page, _):
                 studio.restart()
                 if not studio.playing:
                     studio.toggle()
@@ -382,4 +379,3 @@ def test_a_hostile_page_in_the_same_browser_can_do_nothing(elsewhere):
                 browser.wait_until(page, lambda: not studio.playing, "the studio to pause")
                 page.get_by_role("button", name="Play").click()
                 browser.wait_until(page, lambda: studio.playing, "the studio to play")
-                assert traffic.errors == []

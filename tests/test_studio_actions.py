@@ -17,7 +17,7 @@ from kumite.scene import ActionPlayback, action_recording
 from kumite.studio import Studio
 from kumite.studio.action_list import Filter, action_html
 from tests import browser
-from tests.test_studio import running, wait
+from tests.stranger import wait
 
 
 def test_an_action_is_the_capture_from_the_origin(whole: Layer):
@@ -124,7 +124,6 @@ def _pick(page, name: str, option: str) -> None:
 
 @pytest.mark.slow
 def test_a_click_plays_an_action(whole: Layer):
-    browser.need_chromium()
     stage = ActionPlayback(whole)
     actions = stage.actions
     listed = Filter(stage)
@@ -135,11 +134,8 @@ def test_a_click_plays_an_action(whole: Layer):
         if np.sum((actions.clip == c) & (actions.kind == attack)) >= 3
     )
     mine = np.flatnonzero((actions.clip == clip) & (actions.kind == attack)).tolist()
-    with running(Studio(stage, port=0)) as studio, browser.open_page(studio.url) as (page, traffic):
-        client = browser.client_of(studio.server, page)
-        page.wait_for_selector("canvas")
-        page.wait_for_timeout(1500)
-        browser.close_notes(page)
+    studio = Studio(stage, port=0)
+    with browser.watching(studio) as (page, client):
 
         def plays(k: int) -> None:
             """Action k is played, and the page says so and shows a frame of it."""
@@ -196,4 +192,3 @@ def test_a_click_plays_an_action(whole: Layer):
         (shirt,) = main_colours(stage.names)
         strong, weak = int(np.argmax(shirt)), int(np.argmin(shirt))
         assert ((patch[..., strong] - patch[..., weak]) > 40).mean() > 0.3
-        assert traffic.errors == []

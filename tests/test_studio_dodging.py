@@ -33,7 +33,7 @@ from kumite.studio.throwing import BELOW, NEAR, aim_along
 from kumite.studio.wording import EventLog, describe, place, score_html, struck
 from tests import browser
 from tests.shared import builtin
-from tests.test_studio import running, wait
+from tests.test_studio import wait
 
 
 @pytest.fixture(scope="module")
@@ -350,17 +350,11 @@ def test_a_recording_of_dodging_shows_the_balls(avoiders: Layer, tmp_path):
 
 @pytest.mark.slow
 def test_a_click_throws_a_ball_and_switches_show_volumes(avoiders: Layer):
-    browser.need_chromium()
     stage = dodgeball(avoiders)
     studio = Studio(stage, port=0)
-    with running(studio), browser.open_page(studio.url) as (page, traffic):
-        client = browser.client_of(studio.server, page)
-        page.wait_for_selector("canvas")
-        page.wait_for_timeout(2500)
-        browser.close_notes(page)
-        studio.set_follow(False)
-        studio.toggle()
-        page.wait_for_timeout(500)
+    studio.set_follow(False)
+    studio.toggle()
+    with browser.watching(studio) as (page, client):
         chest = stage.cast.position[0, stage.skeleton.joint("chest")].copy()
         eye = studio.from_page(client.camera.position)
         page.mouse.click(*browser.project(studio.seen_at(chest), client.camera, page))
@@ -406,4 +400,3 @@ def test_a_click_throws_a_ball_and_switches_show_volumes(avoiders: Layer):
             page, lambda: {"avoided", "struck"} & set(kinds(stage)) != set(), "the ball's end"
         )
         browser.wait_until(page, lambda: "is thrown" in page.inner_text("body"), "a line of it")
-        assert traffic.errors == []

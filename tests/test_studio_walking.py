@@ -28,7 +28,7 @@ from kumite.studio.leading import DOWN, LEFT, NEAR, RIGHT, STEP, UP, Leader, mea
 from kumite.studio.wording import EventLog, describe, lines_html, score_html
 from tests import browser
 from tests.shared import builtin
-from tests.test_studio import running, wait
+from tests.test_studio import wait
 
 Make = Callable[..., PrepareScene]
 
@@ -396,15 +396,10 @@ def test_bars_have_no_wheels(make: Make, tmp_path: Path):
 
 @pytest.mark.slow
 def test_clicks_and_keys_lead_a_walker(make: Make):
-    browser.need_chromium()
     stage = make("ball-kick", automatic=False)
     studio = Studio(stage, port=0)
     studio.toggle()
-    with running(studio), browser.open_page(studio.url) as (page, traffic):
-        client = browser.client_of(studio.server, page)
-        page.wait_for_selector("canvas")
-        page.wait_for_timeout(2500)
-        browser.close_notes(page)
+    with browser.watching(studio) as (page, client):
 
         def spot(point: np.ndarray) -> tuple[float, float]:
             return browser.project(studio.seen_at(point), client.camera, page)
@@ -454,4 +449,3 @@ def test_clicks_and_keys_lead_a_walker(make: Make):
         assert wait(lambda: stage.automatic)
         page.keyboard.press("b")
         assert wait(lambda: not stage.automatic), "the box keeps the keys to itself"
-        assert traffic.errors == []
