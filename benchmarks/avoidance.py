@@ -32,6 +32,7 @@ from kumite.rotation import planar_apply
 from kumite.scene import load_scene
 from kumite.scene.balls import aimed
 from kumite.scene.dodge import AIM_SPREAD, DodgeScene
+from kumite.scene.events import Struck, Throw
 from kumite.scene.settings_dodge import BallsSettings, DodgersSettings, DodgeSettings
 
 SEED = 20110
@@ -85,7 +86,7 @@ class Asked:
 
 
 @dataclass(eq=False)
-class Throw:
+class Thrown:
     """What became of one."""
 
     searches: list[Asked] = field(default_factory=list)
@@ -107,15 +108,15 @@ def scene_of(name: str) -> DodgeScene:
     return DodgeScene(type(settings).model_construct(**new), library(name))
 
 
-def play(name: str, throws: int, *, blind: bool = False) -> list[Throw]:
+def play(name: str, throws: int, *, blind: bool = False) -> list[Thrown]:
     """Throws at one who avoids; blind: who does not look."""
     return [t for run in range(RUNS) for t in _play(name, SEED + run, -(-throws // RUNS), blind)]
 
 
-def _play(name: str, seed: int, throws: int, blind: bool) -> list[Throw]:
+def _play(name: str, seed: int, throws: int, blind: bool) -> list[Thrown]:
     scene = scene_of(name)
     scene.reset(seed)
-    search, out = scene.search, [Throw() for _ in range(throws)]
+    search, out = scene.search, [Thrown() for _ in range(throws)]
     plain = type(search).search
 
     def noted(standing, attacks, now, *, main=0):
@@ -127,16 +128,16 @@ def _play(name: str, seed: int, throws: int, blind: bool) -> list[Throw]:
 
     vars(search)["search"] = noted
     if blind:
-        vars(scene.dodgers)["menace"] = lambda *given: None
+        vars(scene.dodgers)["menace"] = lambda *given, **said: None
     spheres, before, first, most = search.spheres, None, None, 0.0
     current = -1
     for _ in range(round((1.0 + throws * EVERY) * scene.fps)):
         known = len(scene.events)
         scene.step()
         for event in scene.events[known:]:
-            if event.kind == "throw":
-                current, first, most = event.data["attack"] - 1, None, np.zeros(len(spheres))
-            elif event.kind == "struck" and event.data["attack"] - 1 == current:
+            if isinstance(event, Throw):
+                current, first, most = event.attack - 1, None, np.zeros(len(spheres))
+            elif isinstance(event, Struck) and event.attack - 1 == current:
                 out[current].struck = True
         if current < 0:
             continue
@@ -241,7 +242,7 @@ def _section(name: str):
 
 
 @cache
-def played(name: str, throws: int) -> list[Throw]:
+def played(name: str, throws: int) -> list[Thrown]:
     """Those of the built-in library are fewer: it is the largest, and only to compare with."""
     return play(name, throws if name != "performer" else max(throws * 3 // 10, FEW_THROWS))
 
@@ -306,7 +307,7 @@ def _in_time(throws: int) -> str:
     return f"{one}\n\n{_table((*header, 'by more than 4', 'searches without any'), why)}"
 
 
-def _taken(throw: Throw) -> bool:
+def _taken(throw: Thrown) -> bool:
     return any(s.found.outcome == Outcome.FOUND for s in throw.searches)
 
 
@@ -468,7 +469,7 @@ def barrage(throws: int) -> str:
             scene.step()
             slowest = max(slowest, time.perf_counter() - begin)
         wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-        thrown = sum(e.kind == "throw" for e in scene.events)
+        thrown = sum(isinstance(e, Throw) for e in scene.events)
         rows.append(
             (count, f"{1 / every:g}", thrown, f"{wall / seconds:.2f} s", f"{cpu / seconds:.2f} s",
              f"{1e3 * slowest:.0f} ms")

@@ -20,6 +20,7 @@ from kumite.control import Route, cache_folder
 from kumite.control.styles import VULNERABILITY, short_range
 from kumite.graph import Layer, build_actions, builtin_layer
 from kumite.scene import BoutScene, SceneSettings, load_scene, with_count
+from kumite.scene.events import Hit, Reaction, Strike
 
 FIRST_SEED = 200  # no settings were chosen with this one or those after it in view
 SECONDS = 30.0
@@ -129,13 +130,13 @@ def play(job: Job) -> Fight:
     damage, falls = [0.0 for _ in people], [[] for _ in people]
     for e in scene.events:
         k = number[e.character]
-        if e.kind == "strike":
-            thrown[k].append(bool(short[e.data["blow"]]))
-        elif e.kind == "hit" and not e.data["blocked"]:
-            landed[k].append(bool(short[e.data["blow"]]))
-            at = "head" if e.data["part"] == "head" else "torso"
-            damage[k] += float(e.data["speed"]) * VULNERABILITY[at]
-        elif e.kind == "reaction" and scene.tree.labels[e.data["stretch"]] == "fall":
+        if isinstance(e, Strike):
+            thrown[k].append(bool(short[e.blow]))
+        elif isinstance(e, Hit) and not e.blocked:
+            landed[k].append(bool(short[e.blow]))
+            at = "head" if e.part == "head" else "torso"
+            damage[k] += e.speed * VULNERABILITY[at]
+        elif isinstance(e, Reaction) and scene.tree.labels[e.stretch] == "fall":
             falls[k].append(e.frame / scene.fps)
     down = np.array([scene.tree.labels[s] == "fall" for s in scene.stretch])
     nodes = sum(int(d.nodes.sum()) for d in scene.decisions)

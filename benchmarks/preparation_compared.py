@@ -27,6 +27,7 @@ from kumite.graph import Layer, builtin_layer, load_library
 from kumite.graph.preparing import KINDS
 from kumite.rotation import angle, conjugate, log, multiply, rotate
 from kumite.scene import PrepareScene
+from kumite.scene.events import Hit, Launch, Passed, Touched
 from kumite.scene.metrics import foot_skate, source_skate
 from kumite.scene.settings import SceneSettings
 from kumite.scene.settings_prepare import PrepareSettings, TargetSettings, WalkerSettings
@@ -148,16 +149,16 @@ def approach(library: Layer, cache_at: Path | None, way: str, runs: int, seed: i
         scene.step()
         for event in scene.events[known:]:
             k = int(event.character[1:])
-            if event.kind == "launch" and launch[k] < 0 and f < PATIENCE * fps:
+            if isinstance(event, Launch) and launch[k] < 0 and f < PATIENCE * fps:
                 launch[k], t = f, int(w.doing[k])
-                apart[k], to_contact[k] = event.data["apart_deg"], event.data["to_contact"]
+                apart[k], to_contact[k] = event.apart_deg, event.to_contact
                 like = headless(wxyz[k : k + 1], yaw[k : k + 1])
                 off = angle(reference[t][None], like)
                 to_reference[k] = np.degrees(np.sqrt(np.mean(off**2)))
             first = launch[k] >= 0 and f < launch[k] + AFTER * fps
-            hit[k] |= event.kind == "hit" and first
-            passed[k] |= event.kind == "passed" and first
-            touched[k] |= event.kind == "touched" and first
+            hit[k] |= isinstance(event, Hit) and first
+            passed[k] |= isinstance(event, Passed) and first
+            touched[k] |= isinstance(event, Touched) and first
         known = len(scene.events)
         shown = w.shown
         now_moving = (shown.root_position - root) * fps

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from kumite import LiveScene, builtin_layer, load_scene, record, save_recording
+from kumite.scene.events import Hit
 
 Path("ring.toml").write_text(
     """
@@ -30,8 +31,7 @@ strike = 5.0
 scene = LiveScene(load_scene("ring.toml"), builtin_layer(None), seed=2)
 fight = record(scene, seconds=20)
 for event in fight.events:
-    if event.kind == "hit":
-        d = event.data
-        print(f"{d['time']:6.2f} s  {event.character} hits {d['victim']}'s {d['part']} "
-              f"with the {d['limb'].replace('_', ' ')} at {d['speed']:.1f} m/s")  # fmt: skip
+    if isinstance(event, Hit):
+        print(f"{event.time:6.2f} s  {event.character} hits {event.victim}'s {event.part} "
+              f"with the {event.limb.replace('_', ' ')} at {event.speed:.1f} m/s")  # fmt: skip
 save_recording("ring.rec", fight)

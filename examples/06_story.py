@@ -1,8 +1,8 @@
 """Two stories: a car that runs an enemy down, and a friend who steps in; what happened and when."""
 
 from kumite import BoutScene, builtin_layer, load_scene
-
-TOLD = ("cue", "run over", "reaction")
+from kumite.scene.events import Cue, Reaction, RunOver
+from kumite.scene.wording import describe
 
 for name, style in (("car", "boxing"), ("alley", "sword")):
     settings = load_scene(name)
@@ -11,6 +11,6 @@ for name, style in (("car", "boxing"), ("alley", "sword")):
         scene.step()
     print(settings.about)
     for event in scene.events:
-        if event.kind in TOLD and event.data.get("size", "fall") == "fall":
-            what = event.data.get("by") or event.data.get("action") or "fights otherwise"
-            print(f"{event.frame / scene.fps:6.2f} s  {event.kind}: {event.character}, {what}")
+        match event:
+            case Cue() | RunOver() | Reaction(size="fall"):
+                print(f"{event.frame / scene.fps:6.2f} s  {event.character}, {describe(event)}")

@@ -4,6 +4,7 @@ import numpy as np
 
 from kumite import AvoidanceSearch, DodgeScene, builtin_layer, load_scene
 from kumite.control import Standing, thrown
+from kumite.scene.events import Avoided, Struck, Throw
 
 library = builtin_layer(None, style="avoidance", level="avoidance")
 
@@ -22,5 +23,5 @@ scene = DodgeScene(load_scene("dodgeball"), library, seed=3)
 for _ in range(12 * round(scene.fps)):
     scene.step()
 for event in scene.events:
-    if event.kind in ("throw", "avoided", "struck"):
-        print(f"{event.frame / scene.fps:6.2f} s  {event.kind} (attack {event.data['attack']})")
+    if isinstance(event, Throw | Avoided | Struck):
+        print(f"{event.frame / scene.fps:6.2f} s  {event.kind} (attack {event.attack})")

@@ -12,6 +12,7 @@ from kumite.errors import KumiteError
 from kumite.graph import Layer, build_actions
 from kumite.mocap import load
 from kumite.scene import BoutScene, SceneSettings, load_scene, measure, record
+from kumite.scene.events import CheckPointMissed, CheckPointReached, Decision, Hit, Reaction
 from tests.shared import builtin
 
 
@@ -39,9 +40,7 @@ def _run(scene: BoutScene, seconds: float) -> np.ndarray:
 
 
 def _landed(scene: BoutScene, name: str) -> int:
-    return sum(
-        e.kind == "hit" and e.character == name and not e.data["blocked"] for e in scene.events
-    )
+    return sum(isinstance(e, Hit) and e.character == name and not e.blocked for e in scene.events)
 
 
 def test_two_fight_and_the_log_says_what_was_looked_at(actions: Layer):
@@ -50,9 +49,10 @@ def test_two_fight_and_the_log_says_what_was_looked_at(actions: Layer):
     kinds = {e.kind for e in recording.events}
     assert {"decision", "strike", "hit", "reaction"} <= kinds
     for e in recording.events:
-        if e.kind == "decision":
-            assert e.data["considered"] >= e.data["nodes"] > 1 and 0 <= e.data["pruned"] < 1
-            assert scene.tree.kinds[e.data["stretch"]] != "reaction"  # nobody chooses to be struck
+        if isinstance(e, Decision):
+            assert e.by == "tree" and e.considered and e.nodes and e.pruned is not None
+            assert e.considered >= e.nodes > 1 and 0 <= e.pruned < 1
+            assert scene.tree.kinds[e.stretch] != "reaction"  # nobody chooses to be struck
     found = measure(recording)
     assert found.min_separation_m is not None and found.min_separation_m > 0.3
     for c in found.characters:
@@ -66,18 +66,18 @@ def test_the_real_boxer_fights(mocap: Path):
     for scene in scenes:
         _run(scene, 15.0)
         for name in scene.names:
-            chosen = [e for e in scene.events if e.kind == "decision" and e.character == name]
-            assert any(scene.tree.kinds[e.data["stretch"]] == "attack" for e in chosen)
+            chosen = [e for e in scene.events if isinstance(e, Decision) and e.character == name]
+            assert any(scene.tree.kinds[e.stretch] == "attack" for e in chosen)
     assert sum(_landed(s, name) for s in scenes for name in s.names) >= 2
 
 
 def test_a_blow_that_lands_brings_its_reaction_and_one_that_is_blocked_does_not(actions: Layer):
     scene = _fight(actions, seed=3)
     _run(scene, 15.0)
-    hits = [e for e in scene.events if e.kind == "hit"]
-    reactions = {(e.frame, e.character) for e in scene.events if e.kind == "reaction"}
-    assert any(not e.data["blocked"] for e in hits)
-    struck = {(e.frame, e.data["victim"]) for e in hits if not e.data["blocked"]}
+    hits = [e for e in scene.events if isinstance(e, Hit)]
+    reactions = {(e.frame, e.character) for e in scene.events if isinstance(e, Reaction)}
+    assert any(not e.blocked for e in hits)
+    struck = {(e.frame, e.victim) for e in hits if not e.blocked}
     assert reactions == struck
 
 
@@ -149,10 +149,10 @@ def test_a_pair_follows_check_points_and_says_what_it_missed(actions: Layer):
     far["point"] = [{"place": (40.0, 0.0), "time": 5.0}]
     scene = _fight(actions, red=path, blue=far)
     _run(scene, 25.0)
-    reached = [e.data["point"] for e in scene.events if e.kind == "check point"]
+    reached = [e.point for e in scene.events if isinstance(e, CheckPointReached)]
     assert reached == list(range(len(reached))) and len(reached) >= 2
-    (missed,) = [e for e in scene.events if e.kind == "missed"]
-    assert missed.character == "blue" and missed.data["due"] == 5.0 and missed.data["by"] > 20.0
+    (missed,) = [e for e in scene.events if isinstance(e, CheckPointMissed)]
+    assert missed.character == "blue" and missed.due == 5.0 and missed.distance > 20.0
 
 
 def test_each_check_point_that_is_missed_is_told_though_one_before_it_was_reached_late(
@@ -162,10 +162,10 @@ def test_each_check_point_that_is_missed_is_told_though_one_before_it_was_reache
     far = [{"place": (40.0, 0.0), "time": t} for t in (6.0, 8.0)]
     scene = _fight(actions, red={"point": late + far, "depth": 1})
     _run(scene, 9.0)
-    told = [e.data["point"] for e in scene.events if e.kind == "missed"]
+    told = [e.point for e in scene.events if isinstance(e, CheckPointMissed)]
     assert told == [0, 1, 2]
-    (reached,) = [e for e in scene.events if e.kind == "check point"]
-    assert reached.data["point"] == 0 and reached.data["late_by"] > 0
+    (reached,) = [e for e in scene.events if isinstance(e, CheckPointReached)]
+    assert reached.point == 0 and reached.late_by > 0
 
 
 def test_two_share_a_check_point_by_the_middle_between_them(actions: Layer):

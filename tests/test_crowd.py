@@ -13,6 +13,7 @@ from kumite.kernels import crowd as kernels
 from kumite.kernels import near
 from kumite.scene import LiveScene, SceneSettings, live, load_scene, measure, record, with_count
 from kumite.scene import memory as memory_module
+from kumite.scene.events import Strike
 from kumite.scene.pairs import pair_up
 
 
@@ -113,7 +114,7 @@ def test_one_who_aims_at_the_nearest_among_named_ones_aims_at_another(library: L
     assert scene._actors.opponent.tolist() == [1, 0, 1]
     for _ in range(int(10 * scene.fps)):
         scene.step()
-    assert any(e.kind == "strike" and e.character == "third" for e in scene.events)
+    assert any(isinstance(e, Strike) and e.character == "third" for e in scene.events)
 
 
 def test_bodies_of_different_pairs_keep_apart(library: Layer):

@@ -13,6 +13,7 @@ from kumite.errors import KumiteError
 from kumite.graph import Layer
 from kumite.scene import BoutScene, SceneSettings, load_scene
 from kumite.scene.controls import SPANS, OrderControl, heed
+from kumite.scene.events import CheckPointMissed, CheckPointReached, Decision
 
 
 def fight(fighters: Layer, *, seed: int = 0, depth: int = 1, **red) -> BoutScene:
@@ -30,7 +31,7 @@ def run(scene: BoutScene, seconds: float) -> list:
     for _ in range(round(seconds * scene.fps)):
         scene.step()
     new = scene.events[count:]
-    return [e for e in new if e.kind == "decision" and e.character == "red"]
+    return [e for e in new if isinstance(e, Decision) and e.character == "red"]
 
 
 def order(scene: BoutScene, field: str) -> OrderControl:
@@ -40,7 +41,7 @@ def order(scene: BoutScene, field: str) -> OrderControl:
 def share(scene: BoutScene, decisions: list, name: str) -> float:
     """Of decisions that were for a kind or label."""
     tree = scene.tree
-    of = [(tree.kinds[e.data["stretch"]], tree.labels[e.data["stretch"]]) for e in decisions]
+    of = [(tree.kinds[e.stretch], tree.labels[e.stretch]) for e in decisions]
     return float(np.mean([name in names for names in of]))
 
 
@@ -96,21 +97,21 @@ def test_only_the_action_set_is_chosen_and_what_is_not_says_so(fighters: Layer):
     run(scene, 3.0)
     order(scene, "only").set(["transition"])
     for e in run(scene, 6.0):
-        inside = scene.tree.kinds[e.data["stretch"]] == "transition"
-        assert inside != e.data.get("outside_set", False)
-        assert abs(e.data["comp"]) < 0.5 * OUTSIDE  # what leaving the set costs is no score
+        inside = scene.tree.kinds[e.stretch] == "transition"
+        assert inside != e.outside_set
+        assert abs(e.comp) < 0.5 * OUTSIDE  # what leaving the set costs is no score
     order(scene, "only").set(["left_hand_straight"])
     decided = run(scene, 8.0)
-    assert {True, False} == {e.data.get("outside_set", False) for e in decided}
+    assert {True, False} == {e.outside_set for e in decided}
     order(scene, "only").set([])
-    assert not any("outside_set" in e.data for e in run(scene, 3.0))
+    assert not any(e.outside_set for e in run(scene, 3.0))
 
 
 def test_the_scene_file_gives_the_action_set(fighters: Layer):
     scene = fight(fighters, only=["transition", "idle"])
     for e in run(scene, 5.0):
-        inside = scene.tree.kinds[e.data["stretch"]] in ("transition", "idle")
-        assert inside != e.data.get("outside_set", False)
+        inside = scene.tree.kinds[e.stretch] in ("transition", "idle")
+        assert inside != e.outside_set
 
 
 def test_what_is_refused_leaves_all_as_it_was(fighters: Layer):
@@ -153,11 +154,11 @@ def test_a_route_is_followed_from_when_it_is_given(fighters: Layer):
     times = [p.time for p in progress.route.points]
     assert times == pytest.approx([scene.frame / scene.fps + t for t in (3.0, 6.0)])
     run(scene, 12.0)
-    reached = [e for e in scene.events if e.kind == "check point"]
-    assert [e.data["point"] for e in reached] == [0, 1]
+    reached = [e for e in scene.events if isinstance(e, CheckPointReached)]
+    assert [e.point for e in reached] == [0, 1]
     scene.set_route("red", None)
     assert scene.progress[0] is None and run(scene, 2.0)
-    assert not [e for e in scene.events if e.kind == "missed" and e.data["point"] > 1]
+    assert not [e for e in scene.events if isinstance(e, CheckPointMissed) and e.point > 1]
 
 
 def test_a_check_point_is_moved_and_what_is_done_stays_done(fighters: Layer):
@@ -170,7 +171,7 @@ def test_a_check_point_is_moved_and_what_is_done_stays_done(fighters: Layer):
     scene.move_check_point("red", 1, (x + 1.5, z))
     assert progress.index == 1 and progress.goal(9.0) == (x + 1.5, z)
     run(scene, 9.0)
-    assert [e.data["point"] for e in scene.events if e.kind == "check point"] == [0, 1]
+    assert [e.point for e in scene.events if isinstance(e, CheckPointReached)] == [0, 1]
     scene.reset(0)  # what was told stays told
     assert scene.progress[0] is not None
     assert scene.progress[0].route.points[1].place == (x + 1.5, z)

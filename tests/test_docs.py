@@ -46,6 +46,7 @@ def test_examples_run(example: str, here: Path, capsys: pytest.CaptureFixture[st
     [
         "README.md",
         "docs/avoidance.md",
+        "docs/events.md",
         "docs/performer.md",
         "docs/preparation.md",
         "docs/reactions.md",

@@ -21,6 +21,7 @@ from kumite.scene import dodgers
 from kumite.scene.balls import Balls, capsules_of, velocity_to
 from kumite.scene.dodge import DodgeScene
 from kumite.scene.dodgers import _after
+from kumite.scene.events import Avoided, Missed, Stale, Struck, Throw
 from kumite.scene.settings import SceneSettings
 from kumite.scene.settings_dodge import (
     BallsSettings,
@@ -151,7 +152,7 @@ def told(made: DodgeScene, frames: int) -> tuple[bytes, list]:
     for _ in range(frames):
         made.step()
         poses.append(made.wxyz.tobytes() + made.root_position.tobytes())
-    return b"".join(poses), [(e.frame, e.kind, e.character, e.data) for e in made.events]
+    return b"".join(poses), [e.to_json() for e in made.events]
 
 
 @pytest.mark.parametrize("latency", [1, 10])
@@ -180,9 +181,9 @@ def test_every_throw_is_told_of_once():
     made = scene(2, 3, every=0.4)
     for _ in range(400):
         made.step()
-    ends = [e.data["attack"] for e in made.events if e.kind in ("struck", "avoided", "missed")]
+    ends = [e.attack for e in made.events if isinstance(e, Struck | Avoided | Missed)]
     assert len(ends) == len(set(ends))
-    thrown = [e.data["attack"] for e in made.events if e.kind == "throw"]
+    thrown = [e.attack for e in made.events if isinstance(e, Throw)]
     assert set(ends) <= set(thrown) and len(ends) >= len(thrown) - 8
 
 
@@ -194,10 +195,8 @@ def test_what_comes_near_nobody_is_not_avoided():
     made.throw(here + ahead, here, 9.0)
     for _ in range(240):
         made.step()
-    ends = {
-        e.data["attack"]: e.kind for e in made.events if e.kind in ("struck", "avoided", "missed")
-    }
-    assert ends[1] == "missed" and ends[2] in ("struck", "avoided")
+    ends = {e.attack: e for e in made.events if isinstance(e, Struck | Avoided | Missed)}
+    assert isinstance(ends[1], Missed) and not isinstance(ends[2], Missed)
 
 
 def test_avoiding_helps():
@@ -205,7 +204,7 @@ def test_avoiding_helps():
     for blind in (False, True):
         made = scene(7, 4, every=0.5)
         if blind:
-            vars(made.dodgers)["menace"] = lambda *given: None
+            vars(made.dodgers)["menace"] = lambda *given, **said: None
         for _ in range(700):
             made.step()
         kinds = [e.kind for e in made.events]
@@ -259,13 +258,13 @@ def test_stale_candidates_are_dropped(fits: bool, monkeypatch):
     edges = mind.edges
     for _ in range(100):
         made.step()
-        if timed or any(e.kind == "stale" for e in made.events):
+        if timed or any(isinstance(e, Stale) for e in made.events):
             break
     assert mind.edges > edges
     if fits and mind.edges == edges + 1:
         assert timed == [(other,)]
     if not fits:
-        assert not timed and any(e.kind == "stale" for e in made.events)
+        assert not timed and any(isinstance(e, Stale) for e in made.events)
 
 
 # The graph ---------------------------------------------------------------------------------------

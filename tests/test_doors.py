@@ -12,8 +12,9 @@ from kumite.errors import KumiteError
 from kumite.export.bvh import write_bvh
 from kumite.export.gltf import write_glb
 from kumite.scene.doors import a_place
-from kumite.scene.recording import Event, Recording
+from kumite.scene.recording import Recording
 from tests import toys
+from tests.telling import event
 
 JUNK = (None, "sparring", 3, 1.5, [], {}, np.zeros(3), object())
 TAKES = {
@@ -60,21 +61,6 @@ def test_a_place_is_three_finite_numbers():
             a_place(place, "ball")
 
 
-@pytest.mark.parametrize(
-    ("kind", "data", "said"),
-    [
-        ("hit", {"speed": "fast"}, "'hit': speed: 'fast'; expected a number"),
-        ("hit", {"place": [0, 1]}, "'hit': place is [2], expected [3]"),
-        ("avoidance", {"costs": "abc"}, "'avoidance': costs"),
-        ("launch", {"level": np.nan}, "'launch': level: nan"),
-        ("throw", {"attack": 1.5}, "'throw': attack: 1.5; expected a whole number"),
-    ],
-)
-def test_what_an_event_says_is_of_its_kind(kind, data, said):
-    with pytest.raises(KumiteError, match=re.escape(said)):
-        Event(3, kind, "red", data)
-
-
 def test_a_recording_in_memory_is_checked():
     clip = toys.still(5)
     good = {
@@ -90,8 +76,10 @@ def test_a_recording_in_memory_is_checked():
         ({"wxyz": np.zeros((5, 1, 18, 4))}, "expected unit quaternions"),
         ({"library_frame": np.full((5, 1), 0.5)}, "expected whole numbers"),
         ({"library_frame": np.full((5, 1), -2)}, "NO_FRAME"),
-        ({"events": (Event(9, "x", "red"),)}, "an event in frame 9; expected 0 to 5"),
-        ({"events": (Event(1, "x", "blue"),)}, "unknown character of an event 'blue'"),
+        ({"events": (event(9, "done", "red"),)}, "an event in frame 9; expected 0 to 5"),
+        ({"events": (event(1, "done", "blue"),)}, "unknown character of an event 'blue'"),
+        ({"events": (event(1, "passed", "red"),)}, "event 'passed': 'beam' is none of the objects"),
+        ({"settings": {"aims_at": ["red"]}}, "aims_at: a list; expected a mapping"),
         ({"settings": {"object_radius": {"a": "big"}}}, "object_radius of 'a': 'big'"),
     ):
         with pytest.raises(KumiteError, match=re.escape(said)):

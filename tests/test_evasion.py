@@ -17,6 +17,7 @@ from kumite.rotation import rotate
 from kumite.scene import EvasionScene, builtin_scenes, measure, record
 from kumite.scene.attackers import recorded_attack
 from kumite.scene.evasion import EvasionScene as Scene
+from kumite.scene.events import Avoided, Foreseen, Hit, Strike
 from kumite.scene.settings import SceneSettings
 from tests.shared import builtin
 
@@ -87,18 +88,18 @@ def test_attacks_of_limbs_say_what_is_wrong(avoiding):
 def test_blades_avoids_what_would_have_hit(blades):
     blades.reset(1)
     recording = record(blades, 16.0)
-    gap = {e.data["attack"]: e.data["gap"] for e in recording.events if e.kind == "foreseen"}
+    gap = {e.attack: e.gap for e in recording.events if isinstance(e, Foreseen)}
     meant = {n for n, g in gap.items() if g < 0.0}
-    hits = {e.data["attack"] for e in recording.events if e.kind == "hit" and "attack" in e.data}
-    avoided = {e.data["attack"] for e in recording.events if e.kind == "avoided"}
+    hits = {e.attack for e in recording.events if isinstance(e, Hit) and e.attack is not None}
+    avoided = {e.attack for e in recording.events if isinstance(e, Avoided)}
     assert meant
     assert len(meant & avoided) > len(meant & hits)
     # Blows that are told of are thrown when it was said.
-    begun = {e.data["attack"]: e for e in recording.events if e.kind == "strike"}
+    begun = {e.attack: e for e in recording.events if isinstance(e, Strike)}
     for e in recording.events:
-        if e.kind == "foreseen" and e.data["attack"] in begun and e.data["begins"] > 0.1:
-            strike = begun[e.data["attack"]]
-            assert strike.frame / recording.fps == pytest.approx(e.data["begins"], abs=0.02)
+        if isinstance(e, Foreseen) and e.attack in begun and e.begins > 0.1:
+            strike = begun[e.attack]
+            assert strike.frame / recording.fps == pytest.approx(e.begins, abs=0.02)
     assert measure(recording).characters[1].thrown == len(begun)
     assert recording.settings["unarmed"] == ["runaway"]
 
@@ -119,7 +120,7 @@ def test_what_is_foreseen_is_what_is_recorded(blades):
         del blades._menace
     of_time = [a for a in seen if a.when[-1] < recording.seconds - 0.1]
     assert of_time
-    struck = {e.frame for e in recording.events if e.kind == "hit"}
+    struck = {e.frame for e in recording.events if isinstance(e, Hit)}
     if not struck:  # undisturbed
         attack = of_time[0]
         limb = "sword" if len(attack.radius) > 10 else "left_hand"

@@ -21,6 +21,7 @@ from kumite.clip import forward_kinematics, tip_positions
 from kumite.errors import KumiteError
 from kumite.graph import Layer
 from kumite.scene import LiveScene, load_scene, measure
+from kumite.scene.events import Hit
 from kumite.studio import Coming, Interlude, Studio
 from kumite.studio.bodies import pose_uncompiled
 from kumite.studio.coming import RECORDING
@@ -34,7 +35,7 @@ def test_the_recorded_fight_is_a_fight():
     metrics = measure(recording)
     assert all(c.landed >= 3 and (c.facing_share or 0.0) > 0.8 for c in metrics.characters)
     assert all(c.join_jump_m_s < 0.3 for c in metrics.characters)
-    assert min(e.frame for e in recording.events if e.kind == "hit") < 3.0 * recording.fps
+    assert min(e.frame for e in recording.events if isinstance(e, Hit)) < 3.0 * recording.fps
     for k in range(2):
         root, wxyz = recording.root_position[:, k], recording.wxyz[:, k]
         position, world = forward_kinematics(recording.skeleton, root, wxyz)

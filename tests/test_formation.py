@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from kumite.errors import KumiteError
 from kumite.scene import BoutScene, SceneSettings, load_scene, with_count
+from kumite.scene.events import Reaction
 from kumite.scene.settings_pairs import APART, PairsSettings
 from tests.shared import builtin
 
@@ -110,7 +111,7 @@ def test_at_the_last_check_point_of_the_spiral_red_knocks_blue_down():
         middle = 0.5 * (ground[::2] + ground[1::2])
         off.append([_off(at, route.places) for at, route in zip(middle, routes)])
         for e in scene.events[told:]:
-            if e.kind == "reaction" and e.data["size"] == "fall":
+            if isinstance(e, Reaction) and e.size == "fall":
                 pair = scene.names.index(e.character) // 2
                 end = routes[pair].places[-1]
                 felled.append((np.hypot(*(middle[pair] - end)), e.frame / scene.fps))

@@ -12,6 +12,7 @@ from kumite.annotate import find_contacts, find_strikes
 from kumite.graph import Layer, build_preparation, find_targets
 from kumite.graph.preparing import KINDS
 from kumite.scene import PrepareScene
+from kumite.scene.events import Launch, Passed
 from kumite.scene.settings import SceneSettings
 from kumite.scene.walkers import OFF
 
@@ -57,8 +58,8 @@ def test_real_clips_pass_under_and_over(woody: Layer, tmp_path: Path):
         scene.step()
         positions.append(scene.walkers.shown.position[0].copy())
     assert np.all(np.isfinite(positions))
-    launches = [e.data for e in scene.events if e.kind == "launch"]
-    assert {d["motion"] for d in launches} == {under, over}
-    assert all(d["bent"] is not None and d["bent"] <= OFF for d in launches)
-    passed = [e.data["clearance"] for e in scene.events if e.kind == "passed"]
+    launches = [e for e in scene.events if isinstance(e, Launch)]
+    assert {d.motion for d in launches} == {under, over}
+    assert all(d.bent is not None and d.bent <= OFF for d in launches)
+    passed = [e.clearance for e in scene.events if isinstance(e, Passed)]
     assert len(passed) >= 2 and min(passed) > 0

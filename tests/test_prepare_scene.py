@@ -14,6 +14,7 @@ from kumite.errors import KumiteError
 from kumite.graph import Layer, save_library
 from kumite.rotation import angle
 from kumite.scene import PrepareScene, load_scene, record, with_count
+from kumite.scene.events import Hit, Launch, MovedGoal, Passed, Touched
 from kumite.scene.settings import SceneSettings
 from kumite.scene.walkers import NOTHING, OFF, ON_THE_WAY, STEEPEST
 from tests.shared import builtin
@@ -72,14 +73,14 @@ def test_things_are_done_without_jumps(targets: Layer, learned: Path, preparatio
             assert abs(alpha - before[2]) < STEEPEST / fps + 1e-9
         before = position.copy(), wxyz.copy(), alpha, on_the_way
     assert max(turned) < 30.0  # rad/s
-    launches = [e for e in scene.events if e.kind == "launch"]
-    assert {e.data["motion"] for e in launches} == {"kick_ball", "duck_under"}
-    assert all(e.data["bent"] is not None and e.data["bent"] <= OFF for e in launches)
-    hits = [e for e in scene.events if e.kind == "hit"]
-    assert hits and all(e.data["part"] == "ball" for e in hits)
-    assert all(e.data["clearance"] > 0 for e in scene.events if e.kind == "passed")
-    assert any(e.kind == "passed" for e in scene.events)
-    assert not any(e.kind == "touched" for e in scene.events)
+    launches = [e for e in scene.events if isinstance(e, Launch)]
+    assert {e.motion for e in launches} == {"kick_ball", "duck_under"}
+    assert all(e.bent is not None and e.bent <= OFF for e in launches)
+    hits = [e for e in scene.events if isinstance(e, Hit)]
+    assert hits and all(e.part == "ball" for e in hits)
+    assert all(e.clearance > 0 for e in scene.events if isinstance(e, Passed))
+    assert any(isinstance(e, Passed) for e in scene.events)
+    assert not any(isinstance(e, Touched) for e in scene.events)
     for event in launches:
         # The pose shown is taken over: what jumps at a launch is at most what a frame turns.
         at = turned[event.frame - 1 : event.frame + 3]
@@ -92,7 +93,7 @@ def test_who_prepares_begins_nearer_to_the_posture(targets: Layer, learned: Path
         scene = scene_of(targets, learned, prepare={"preparation": preparation})
         for _ in range(round(20 * scene.fps)):
             scene.step()
-        found = [e.data["apart_deg"] for e in scene.events if e.kind == "launch"]
+        found = [e.apart_deg for e in scene.events if isinstance(e, Launch)]
         apart[preparation] = float(np.mean(found))
     assert apart["ours"] < 0.4 * apart["none"]
 
@@ -110,7 +111,7 @@ def _between_beams(targets: Layer, learned: Path, apart: float) -> tuple[float, 
     for _ in range(round(40 * scene.fps)):
         known = len(scene.events)
         scene.step()
-        launches += sum(e.kind == "launch" for e in scene.events[known:])
+        launches += sum(isinstance(e, Launch) for e in scene.events[known:])
         if launches == 2:
             break
         if launches == 1 and scene.walkers.doing[0] == ON_THE_WAY:
@@ -144,12 +145,12 @@ def test_who_has_passed_an_obstacle_turns_round_and_comes_back(
     for _ in range(round(40 * scene.fps)):
         scene.step()
     for m in motions:
-        begun = [e.frame for e in scene.events if e.kind == "launch" and e.data["motion"] == m]
+        begun = [e.frame for e in scene.events if isinstance(e, Launch) and e.motion == m]
         gaps = np.diff([0, *begun, scene.frame]) / scene.fps
         assert len(begun) >= 4 and gaps.max() < 11.0, (m, gaps)
-    passed = [e.data["clearance"] for e in scene.events if e.kind == "passed"]
+    passed = [e.clearance for e in scene.events if isinstance(e, Passed)]
     assert len(passed) >= 9 and min(passed) > 0
-    assert not any(e.kind == "touched" for e in scene.events)
+    assert not any(isinstance(e, Touched) for e in scene.events)
 
 
 # What is told by hand ----------------------------------------------------------------------------
@@ -163,7 +164,8 @@ def test_led_by_hand(targets: Layer, learned: Path):
     for x, expected in ((4.1, 4.6), (3.9, 3.4)):
         place = scene.go(0, np.array([x, 0.2]))
         np.testing.assert_allclose(place, [expected, 0.2], atol=1e-9)
-        assert scene.events[-1].kind == "moved goal" and scene.events[-1].data["thing"] == "bar"
+        told = scene.events[-1]
+        assert isinstance(told, MovedGoal) and told.thing == "bar"
     with pytest.raises(KumiteError, match="goal: expected two finite numbers"):
         scene.go(0, np.array([np.nan, 0.0]))
     with pytest.raises(KumiteError, match="thing"):

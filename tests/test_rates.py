@@ -16,6 +16,7 @@ from kumite.graph import Layer
 from kumite.kernels import character as kernels
 from kumite.kernels import phase as phases
 from kumite.scene import LiveScene, live, load_recording, load_scene, measure, record, with_count
+from kumite.scene.events import Decision
 from kumite.scene.metrics import foot_skate, source_skate
 from kumite.scene.recording import save_recording
 from kumite.synthesis import Cast
@@ -308,7 +309,7 @@ def test_a_crowd_of_many_rates_is_the_same_on_all_cores(
     for phase, wxyz in frames[1:]:
         assert phase.tobytes() == frames[0][0].tobytes()
         assert wxyz.tobytes() == frames[0][1].tobytes()
-    who = [e.character for e in scene.events if e.kind == "decision"]
+    who = [e.character for e in scene.events if isinstance(e, Decision)]
     taken = [who.count(name) for name in scene.names]
     assert sum(taken[10:]) > 1.3 * sum(taken[:10])
 
@@ -322,7 +323,7 @@ def test_a_recording_keeps_the_rates(library: Layer, tmp_path: Path):
     assert fight.rate is not None and again.rate is not None
     assert np.array_equal(again.rate, fight.rate)
     assert fight.only(fight.names[1]).rate is not None
-    decided = [e for e in fight.events if e.kind == "decision" and e.data["jump"]]
+    decided = [e for e in fight.events if isinstance(e, Decision) and e.jump]
     found = measure(fight).characters
     assert sum(c.joins for c in found) == pytest.approx(len(decided), abs=6)
     assert record(LiveScene(with_count(load_scene("crowd"), 6), library), 1.0).rate is None

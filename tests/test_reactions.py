@@ -17,6 +17,7 @@ from kumite.kernels.blow import NO_BLOW
 from kumite.kernels.moves import FIELDS, place_at
 from kumite.scene import BoutScene, SceneSettings, load_scene, measure, record
 from kumite.scene.apart import held_apart, pairs, push_apart
+from kumite.scene.events import Reaction
 from kumite.scene.floor import PUSH_SPEED
 from kumite.scene.reactions import MOST_PHYSICAL, Reactions
 from tests.shared import builtin
@@ -40,7 +41,7 @@ def _until_hit(scene: BoutScene, seconds: float = 30.0) -> int:
         before = len(scene.events)
         scene.step()
         for e in scene.events[before:]:
-            if e.kind == "reaction":
+            if isinstance(e, Reaction):
                 return scene.names.index(e.character)
     raise AssertionError("nobody was struck")
 
@@ -63,9 +64,9 @@ def test_a_blow_moves_the_victim_from_the_next_frame_on(actions: Layer, physics:
     for mode in ("physical", "kinematic"):
         scene = _fight(actions, mode)
         k = _until_hit(scene)
-        event = [e for e in scene.events if e.kind == "reaction"][-1]
-        assert event.data["physical"] == (mode == "physical") and event.data["impulse"] > 0
-        assert (event.data["deviation"] is None) == (mode == "kinematic")
+        event = [e for e in scene.events if isinstance(e, Reaction)][-1]
+        assert event.physical == (mode == "physical") and event.impulse > 0
+        assert (event.deviation is None) == (mode == "kinematic")
         at = scene.frame, k, scene.wxyz[k].copy()
         scene.step()
         found[mode] = (*at, scene.wxyz[k].copy())
@@ -88,12 +89,12 @@ def test_the_moment_is_smooth_and_the_response_follows(
 
     monkeypatch.setattr(scene, "step", kept)
     k = _until_hit(scene)
-    event = [e for e in scene.events if e.kind == "reaction"][-1]
+    event = [e for e in scene.events if isinstance(e, Reaction)][-1]
     moment = scene.reactions._moments[k]
     planted, foot = cast.contacts[k].copy(), [scene.skeleton.joint(f"{s}_foot") for s in SIDES]
     stood = cast.position[k, foot].copy()
     stretch = int(scene.stretch[k])
-    assert scene.tree.kinds[stretch] == "reaction" and stretch == event.data["stretch"]
+    assert scene.tree.kinds[stretch] == "reaction" and stretch == event.stretch
     _left_alone(scene, monkeypatch)
     hit = len(poses)  # the pose of the hit is kept by the next step
     frames = moment.left
@@ -174,7 +175,7 @@ def test_who_is_struck_again_is_pushed_from_where_it_is(actions: Layer, physics:
 
 def test_a_physical_fight_is_the_same_every_time(actions: Layer, physics: None):
     a, b = (record(_fight(actions, "physical"), 15.0) for _ in range(2))
-    assert any(e.data.get("physical") for e in a.events)
+    assert any(isinstance(e, Reaction) and e.physical for e in a.events)
     assert a.wxyz.tobytes() == b.wxyz.tobytes() and a.events == b.events
     assert a.root_position.tobytes() == b.root_position.tobytes()
     assert a.library_frame.min() == -1  # poses of physics are no captured ones
@@ -187,8 +188,8 @@ def test_without_mujoco_fights_are_kinematic(actions: Layer, monkeypatch: pytest
     scene = _fight(actions)
     assert not scene.reactions.physical
     _until_hit(scene)
-    (event,) = [e for e in scene.events if e.kind == "reaction"]
-    assert event.data["physical"] is False
+    (event,) = [e for e in scene.events if isinstance(e, Reaction)]
+    assert event.physical is False
     with pytest.raises(KumiteError, match=r"kumite\[physics\]"):
         _fight(actions, "physical")
 

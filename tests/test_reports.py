@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from kumite.scene.recording import Event, Recording
+from kumite.scene.recording import Recording
 from kumite.scene.reports import reports
 from tests import toys
+from tests.telling import event
 
 FPS = 10.0
 
@@ -17,6 +18,7 @@ def told(names: tuple[str, ...], *events: tuple[int, str, str, dict], **settings
     """The reports of a recording of 100 frames in which this happened."""
     skeleton = toys.skeleton()
     shape = (100, len(names))
+    happened = tuple(event(*e) for e in events)
     recording = Recording(
         scene="made up",
         fps=FPS,
@@ -26,7 +28,8 @@ def told(names: tuple[str, ...], *events: tuple[int, str, str, dict], **settings
         wxyz=np.tile([1.0, 0.0, 0.0, 0.0], (*shape, len(skeleton), 1)),
         contacts=np.zeros((*shape, 2), dtype=bool),
         library_frame=np.zeros(shape, dtype=int),
-        events=tuple(Event(*e) for e in events),
+        events=happened,
+        objects=tuple(dict.fromkeys(n for e in happened for n in e.things)),
         settings=settings,
     )
     return {r.name: r for r in reports(recording)}

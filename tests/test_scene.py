@@ -19,7 +19,6 @@ from kumite.kernels import crowd, near
 from kumite.performer import perform
 from kumite.rotation import from_yaw
 from kumite.scene import (
-    Event,
     LiveScene,
     Playback,
     Recording,
@@ -31,9 +30,11 @@ from kumite.scene import (
     record,
     save_recording,
 )
+from kumite.scene.events import Decision, Hit
 from kumite.scene.floor import PUSH_SPEED
 from kumite.scene.metrics import foot_skate, source_skate
 from tests import reference, toys
+from tests.telling import event
 
 
 @pytest.fixture(scope="module")
@@ -260,8 +261,8 @@ def test_a_recording_begins_where_the_scene_is(sparring: LiveScene):
     ]
     for e in second.events:
         assert 0 <= e.frame < len(second)
-        if e.kind == "hit":
-            assert e.data["time"] == pytest.approx(e.frame / second.fps, abs=1.1 / second.fps)
+        if isinstance(e, Hit):
+            assert e.time == pytest.approx(e.frame / second.fps, abs=1.1 / second.fps)
 
 
 def test_bodies_on_one_spot_are_carried_apart_slowly(library: Layer):
@@ -304,7 +305,7 @@ def test_two_boxers_fight(fight: Recording):
 
 
 def test_hits_are_where_a_fist_and_a_body_are(fight: Recording, sparring: LiveScene):
-    hits = [e for e in fight.events if e.kind == "hit"]
+    hits = [e for e in fight.events if isinstance(e, Hit)]
     assert hits
     for e in hits:
         attacker = fight.clip(e.character)
@@ -312,33 +313,32 @@ def test_hits_are_where_a_fist_and_a_body_are(fight: Recording, sparring: LiveSc
 
         pose = [x[e.frame : e.frame + 1] for x in (attacker.root_position, attacker.wxyz)]
         position, world = forward_kinematics(fight.skeleton, *pose)
-        fist = tip_positions(fight.skeleton, e.data["limb"], position, world)[0]
-        moved = e.data["speed"] / fight.fps
-        assert np.linalg.norm(fist - e.data["place"]) < 0.12 + 2 * moved
+        fist = tip_positions(fight.skeleton, e.limb, position, world)[0]
+        moved = e.speed / fight.fps
+        assert np.linalg.norm(fist - e.place) < 0.12 + 2 * moved
         trunk = ("head", "neck", "chest", "waist")
-        assert e.data["part"] in (ARMS if e.data["blocked"] else trunk)
-        assert e.data["victim"] != e.character
-        assert (e.frame - 1) / fight.fps <= e.data["time"] + 1e-3 <= e.frame / fight.fps + 2e-3
+        assert e.part in (ARMS if e.blocked else trunk)
+        assert e.victim != e.character
+        assert (e.frame - 1) / fight.fps <= e.time + 1e-3 <= e.frame / fight.fps + 2e-3
 
 
 def test_a_blow_lands_once(fight: Recording):
     last: dict[tuple, int] = {}
     for e in fight.events:
-        if e.kind == "hit":
-            key = (e.character, e.data["limb"], e.data["blow"])
+        if isinstance(e, Hit):
+            key = (e.character, e.limb, e.blow)
             assert e.frame - last.get(key, -1000) > 5
             last[key] = e.frame
 
 
 def test_a_blow_lands_or_is_blocked_never_both(fight: Recording):
     """Arms stop some blows of a fight, not all; what an arm stopped does not land behind it."""
-    blocked = [e for e in fight.events if e.kind == "hit" and e.data["blocked"]]
-    landed = [e for e in fight.events if e.kind == "hit" and not e.data["blocked"]]
+    blocked = [e for e in fight.events if isinstance(e, Hit) and e.blocked]
+    landed = [e for e in fight.events if isinstance(e, Hit) and not e.blocked]
     assert blocked and landed
     for e in blocked:
         assert not any(
-            (f.character, f.data["limb"], f.data["blow"])
-            == (e.character, e.data["limb"], e.data["blow"])
+            (f.character, f.limb, f.blow) == (e.character, e.limb, e.blow)
             and abs(f.frame - e.frame) <= 5
             for f in landed
         )
@@ -352,16 +352,17 @@ def test_a_struck_body_shows_it(library: Layer):
         seen = len(scene.events)
         scene.step()
         for e in scene.events[seen:]:
-            if e.kind == "hit" and e.data["part"] == "head":
-                k = scene.names.index(e.data["victim"])
+            if isinstance(e, Hit) and e.part == "head":
+                k = scene.names.index(e.victim)
                 moved.append(float(np.abs(scene.cast._offsets.reaction_velocity[k]).max()))
     assert moved and min(moved) > 0.1
 
 
 def test_decisions_are_logged_with_what_was_considered(fight: Recording):
-    decisions = [e for e in fight.events if e.kind == "decision"]
+    decisions = [e for e in fight.events if isinstance(e, Decision)]
     assert len(decisions) > 20
-    assert all(e.data["considered"] >= 1 and e.data["apart"] >= 0 for e in decisions)
+    assert all(e.by == "policy" and e.considered and e.apart is not None for e in decisions)
+    assert all(0 <= (e.apart or 0) <= (e.considered or 0) for e in decisions)
 
 
 def test_behaviours_are_named_in_scene_files_and_tuned_while_it_runs(library: Layer, tmp_path):
@@ -376,7 +377,7 @@ def test_behaviours_are_named_in_scene_files_and_tuned_while_it_runs(library: La
         scene.step()
     away = np.hypot(*(scene.root_position[0, [0, 2]] - [0.0, 0.3]))
     assert away > 1.15
-    assert not any(e.kind == "hit" for e in scene.events)
+    assert not any(isinstance(e, Hit) for e in scene.events)
     weights = {c.behaviour: c for c in scene.controls}
     assert set(weights) == {"approach", "strike", "keep_off"} and weights["keep_off"].value == 2.0
     weights["strike"].set(6.0)
@@ -384,7 +385,7 @@ def test_behaviours_are_named_in_scene_files_and_tuned_while_it_runs(library: La
     weights["keep_off"].set(0.0)
     for _ in range(int(25 * scene.fps)):
         scene.step()
-    assert any(e.kind == "hit" for e in scene.events)
+    assert any(isinstance(e, Hit) for e in scene.events)
     with pytest.raises(KumiteError, match="not all 0"):
         for control in weights.values():
             control.set(0.0)
@@ -415,23 +416,23 @@ def test_a_boxer_goes_for_the_target_wherever_it_is_put(library: Layer):
     scene = LiveScene(load_scene("target"), library, seed=0)
     for place in ([0.0, 1.5, 1.2], [-1.5, 1.45, -1.0], [2.0, 1.5, -1.0]):
         scene.move_object("target", np.array(place))
-        before = sum(e.kind == "hit" for e in scene.events)
+        before = sum(isinstance(e, Hit) for e in scene.events)
         for _ in range(int(25 * scene.fps)):
             scene.step()
         gap = np.hypot(*(scene.root_position[0, [0, 2]] - np.array(place)[[0, 2]]))
         assert gap < 1.3, place
-        assert sum(e.kind == "hit" for e in scene.events) > before, place
+        assert sum(isinstance(e, Hit) for e in scene.events) > before, place
 
 
 def _run(scene: LiveScene, seconds: float) -> tuple[np.ndarray, np.ndarray, int]:
     """Over a time: where the boxer is [F, 2] on the ground, how far off the target [F], hits."""
-    before, ground = sum(e.kind == "hit" for e in scene.events), []
+    before, ground = sum(isinstance(e, Hit) for e in scene.events), []
     for _ in range(int(seconds * scene.fps)):
         scene.step()
         ground.append(scene.root_position[0, [0, 2]])
     way = np.array(ground)
     gap = np.linalg.norm(way - scene.objects[0].position[[0, 2]], axis=1)
-    return way, gap, sum(e.kind == "hit" for e in scene.events) - before
+    return way, gap, sum(isinstance(e, Hit) for e in scene.events) - before
 
 
 def test_a_target_dragged_behind_is_turned_to_and_hit(library: Layer):
@@ -450,7 +451,7 @@ def test_a_target_at_a_height_of_no_blow_is_approached_and_kept_near(library: La
     assert hits == 0 and gap[late:].max() < 1.0
     # Nobody stands still: he decides, and his feet carry him about it.
     assert np.linalg.norm(np.diff(way[late:], axis=0), axis=1).sum() > 0.4
-    assert sum(e.kind == "decision" for e in scene.events) >= 10
+    assert sum(isinstance(e, Decision) for e in scene.events) >= 10
 
 
 def test_a_target_out_of_every_grid_is_walked_to(library: Layer):
@@ -486,9 +487,7 @@ def test_recordings_round_trip(fight: Recording, tmp_path):
     back = load_recording(tmp_path / "a.rec")
     assert back.names == fight.names and back.fps == fight.fps
     assert np.array_equal(back.wxyz, fight.wxyz)
-    assert [(e.frame, e.kind, dict(e.data)) for e in back.events] == [
-        (e.frame, e.kind, dict(e.data)) for e in fight.events
-    ]
+    assert back.events == fight.events
     save_recording(tmp_path / "b.rec", back)
     assert (tmp_path / "a.rec").read_bytes() == (tmp_path / "b.rec").read_bytes()
     assert measure(back) == measure(fight)
@@ -544,9 +543,9 @@ def _standing(positions: list[list[float]], yaws: list[float], frames: int = 31)
         np.ones((frames, count, 2), bool),
         np.tile(np.arange(frames)[:, None], (1, count)),
         events=(
-            Event(3, "strike", "a", {}),
-            Event(5, "hit", "a", {}),
-            Event(8, "hit", "a", {"part": "left_forearm", "blocked": True}),
+            event(3, "strike", "a"),
+            event(5, "hit", "a"),
+            event(8, "hit", "a", {"part": "left_forearm", "blocked": True}),
         ),
         settings={"aims_at": {"a": "b", "b": "a"}, "source_skate_m_s": 0.5},
     )
@@ -616,7 +615,7 @@ def test_two_of_one_clip_do_not_move_in_step():
             scene.step()
             apart.append(abs(int(scene.cast.frame[0]) - int(scene.cast.frame[1])))
         assert np.mean(np.array(apart) <= 2) < 0.1, seed
-        assert any(e.kind == "hit" for e in scene.events), seed
+        assert any(isinstance(e, Hit) for e in scene.events), seed
 
 
 def test_who_chooses_at_the_same_moment_does_not_choose_the_same(library: Layer):

@@ -26,8 +26,10 @@ from kumite.export.sheet import (
 )
 from kumite.graph import Layer
 from kumite.kernels.raster import draw_triangles
-from kumite.scene import Event, LiveScene, Recording, load_scene, record
+from kumite.scene import LiveScene, Recording, load_scene, record
+from kumite.scene.events import Hit
 from tests import toys
+from tests.telling import event
 
 
 def _still(count: int = 1):
@@ -141,14 +143,14 @@ def fight(library: Layer) -> Recording:
 
 def test_a_sheet_shows_the_hits(fight: Recording, tmp_path):
     """As many cells as hits, each in its frame, both fighters large in it, the hit marked."""
-    hits = [e for e in fight.events if e.kind == "hit"]
+    hits = [e for e in fight.events if isinstance(e, Hit)]
     found = moments(fight, "hits", most=5)
     assert len(found) == 5 < len(hits) and found == sorted(found, key=lambda m: m.frame)
-    frames = [round(e.data["time"] * fight.fps) for e in hits]
+    frames = [round(e.time * fight.fps) for e in hits]
     assert {m.frame for m in found} <= set(frames)
     assert found[0].frame == frames[0] and found[-1].frame == frames[-1]
     text = found[0].text.replace(" ", "_")
-    assert hits[0].data["part"] in text and hits[0].character in text
+    assert hits[0].part in text and hits[0].character in text
 
     image = moment_image(fight, found[:2], size=(180, 160)).astype(int)
     for x in (0, 182):
@@ -185,10 +187,10 @@ def test_a_ball_is_shown_where_it_comes_nearest():
         objects=("ball 1",),
         object_position=ball[:, None],
         events=(
-            Event(2, "throw", "anna", {"attack": 1, "ball": "ball 1"}),
-            Event(3, "avoidance", "anna", {"attack": 1, "outcome": "found"}),
-            Event(55, "avoided", "anna", {"attack": 1}),
-            Event(58, "avoided", "anna", {"attack": 2}),  # by luck: not shown
+            event(2, "throw", "anna", {"attack": 1, "ball": "ball 1"}),
+            event(3, "avoidance", "anna", {"attack": 1, "outcome": "found"}),
+            event(55, "avoided", "anna", {"attack": 1, "ball": "ball 1"}),
+            event(58, "avoided", "anna", {"attack": 2}),  # by luck: not shown
         ),
     )
     (moment,) = moments(recording)

@@ -23,6 +23,7 @@ from kumite.scene import (
     record,
     save_recording,
 )
+from kumite.scene.events import Cue, Decision, Hit, Reaction, RunOver, Strike
 from kumite.scene.look import car
 from kumite.scene.settings_fight import CueSettings, VehicleSettings
 from kumite.scene.story import BRAKE, CLEAR, Story, Vehicle
@@ -217,8 +218,9 @@ def test_a_cue_changes_what_it_names_and_a_restart_takes_it_back(actions: Layer,
             changed = k == 0 and name == field
             assert getattr(now, name) == (expected if changed else value)
     assert np.array_equal(scene.floor.opponent, opponents)
-    (event,) = [e for e in scene.events if e.kind == "cue"]
-    assert (event.frame, event.character, set(event.data)) == (3, "red", {field})
+    (event,) = [e for e in scene.events if isinstance(e, Cue)]
+    frame, _, who, said = event.to_json()
+    assert (frame, who, set(said)) == (3, "red", {field})
     scene.reset(1)
     assert scene.players == before
 
@@ -245,13 +247,13 @@ def test_who_is_run_over_falls_and_lies_and_the_other_only_idles(actions: Layer)
     scene = BoutScene(SceneSettings.model_validate(settings), actions, seed=0)
     for _ in range(8 * round(scene.fps)):
         scene.step()
-    (over,) = [e for e in scene.events if e.kind == "run over"]
-    assert over.character == "blue" and over.data["by"] == "car"
-    assert over.data["speed"] == pytest.approx(14.0)
+    (over,) = [e for e in scene.events if isinstance(e, RunOver)]
+    assert over.character == "blue" and over.vehicle == "car"
+    assert over.speed == pytest.approx(14.0)
     assert scene.root_position[1, 1] < 0.4  # it lies
     later = [e for e in scene.events if e.frame > over.frame + 2 * scene.fps]
-    assert not [e for e in later if e.kind == "decision" and e.character == "blue"]
-    chosen = [e.data["stretch"] for e in later if e.kind == "decision" and e.character == "red"]
+    assert not [e for e in later if isinstance(e, Decision) and e.character == "blue"]
+    chosen = [e.stretch for e in later if isinstance(e, Decision) and e.character == "red"]
     assert chosen and {scene.tree.kinds[s] for s in chosen} == {"idle"}
     assert not [e for e in later if e.kind in ("strike", "hit")]
 
@@ -355,16 +357,14 @@ def _run(name: str, seconds: float, seed: int) -> BoutScene:
 
 
 def _hits_on(scene: BoutScene, name: str) -> int:
-    return sum(
-        e.kind == "hit" and e.data["victim"] == name and not e.data["blocked"] for e in scene.events
-    )
+    return sum(isinstance(e, Hit) and e.victim == name and not e.blocked for e in scene.events)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 def test_the_strong_enemy_is_run_over_and_the_hero_is_not(seed: int):
     scene = _run("car", 26.0, seed)
-    over = [e for e in scene.events if e.kind == "run over"]
+    over = [e for e in scene.events if isinstance(e, RunOver)]
     assert [e.character for e in over] == ["blue"]
     assert _hits_on(scene, "red") > _hits_on(scene, "blue")
     assert scene.root_position[1, 1] < 0.4 and scene.root_position[0, 1] > 0.6
@@ -375,12 +375,12 @@ def test_the_strong_enemy_is_run_over_and_the_hero_is_not(seed: int):
 @pytest.mark.parametrize("seed", [0, 1])
 def test_the_friend_steps_in_and_knocks_the_enemy_down(seed: int):
     scene = _run("alley", 30.0, seed)
-    (fall,) = [e for e in scene.events if e.kind == "reaction" and e.data["size"] == "fall"]
+    (fall,) = [e for e in scene.events if isinstance(e, Reaction) and e.size == "fall"]
     assert fall.character == "blue"
-    blow = [e for e in scene.events if e.kind == "hit" and e.frame == fall.frame]
-    assert [e.character for e in blow if not e.data["blocked"]] == ["green"]
-    cues = [e.frame for e in scene.events if e.kind == "cue"]
+    blow = [e for e in scene.events if isinstance(e, Hit) and e.frame == fall.frame]
+    assert [e.character for e in blow if not e.blocked] == ["green"]
+    cues = [e.frame for e in scene.events if isinstance(e, Cue)]
     assert max(cues) < fall.frame
     assert scene.root_position[1, 1] < 0.5
     later = [e for e in scene.events if e.frame > fall.frame + 2 * scene.fps]
-    assert not [e for e in later if e.kind == "strike"]
+    assert not [e for e in later if isinstance(e, Strike)]

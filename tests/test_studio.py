@@ -13,6 +13,7 @@ from kumite.clip import forward_kinematics
 from kumite.errors import KumiteError
 from kumite.graph import Layer
 from kumite.scene import LiveScene, Playback, load_scene, record
+from kumite.scene.events import Hit
 from kumite.studio import Studio, serve, wording
 from kumite.studio.pace import Pace
 from tests import browser
@@ -31,10 +32,9 @@ def test_nothing_listens_beyond_this_machine(library: Layer):
 
 
 def test_a_hit_is_shown_where_it_landed(library: Layer):
-    hits = [e for e in record(live(library, "sparring"), 20.0).events if e.kind == "hit"]
+    hits = [e for e in record(live(library, "sparring"), 20.0).events if isinstance(e, Hit)]
     assert hits
-    assert all(wording.place(e) == e.data["place"] for e in hits)
-    assert all(wording.struck(e) == e.data["victim"] for e in hits)
+    assert all(wording.struck(e) == e.victim for e in hits)
 
 
 def test_it_ends_by_itself_and_says_where_it_is(library: Layer):
@@ -179,7 +179,7 @@ def test_the_target_is_dragged_and_the_boxer_goes_for_it(library: Layer):
             return bool(np.hypot(*gap) < reach)
 
         browser.wait_until(page, arrived, "the boxer to come to the target", 60)
-        hits = sum(e.kind == "hit" for e in stage.events)
+        hits = sum(isinstance(e, Hit) for e in stage.events)
         browser.wait_until(
-            page, lambda: sum(e.kind == "hit" for e in stage.events) > hits, "a hit", 60
+            page, lambda: sum(isinstance(e, Hit) for e in stage.events) > hits, "a hit", 60
         )

@@ -9,6 +9,7 @@ import viser
 from kumite.control import CheckPoint, Route
 from kumite.graph import Layer
 from kumite.scene import BoutScene, SceneSettings, load_scene
+from kumite.scene.events import CheckPointReached, Decision
 from kumite.studio import Studio
 from kumite.studio.paths import Path, Sketch, on_floor, sketched
 from tests import browser
@@ -139,7 +140,9 @@ def test_a_path_is_drawn_dragged_and_cleared_with_the_mouse(fighters: Layer):
         studio.toggle()
         browser.wait_until(
             page,
-            lambda: any(e.kind == "check point" and e.character == "red" for e in stage.events),
+            lambda: any(
+                isinstance(e, CheckPointReached) and e.character == "red" for e in stage.events
+            ),
             "a check point",
             60,
         )
@@ -206,12 +209,12 @@ def test_weights_and_actions_are_told_on_the_page(fighters: Layer):
         studio.toggle()
 
         def decided() -> list:
-            return [e for e in stage.events[count:] if e.kind == "decision"]
+            return [e for e in stage.events[count:] if isinstance(e, Decision)]
 
         browser.wait_until(
             page, lambda: sum(e.character == "red" for e in decided()) >= 5, "decisions", 60
         )
         for e in decided():
             if e.character == "red":
-                inside = stage.tree.kinds[e.data["stretch"]] == "transition"
-                assert inside != e.data.get("outside_set", False)
+                inside = stage.tree.kinds[e.stretch] == "transition"
+                assert inside != e.outside_set

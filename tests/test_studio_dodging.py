@@ -24,15 +24,17 @@ from kumite.scene import (
     with_count,
     with_throws,
 )
-from kumite.scene.recording import Event
+from kumite.scene.events import Struck, Throw
 from kumite.scene.stage import in_sight
 from kumite.scene.volumes import attack_volume, avoidance_volume, body_volume
+from kumite.scene.wording import describe
 from kumite.studio import Studio
 from kumite.studio.props import TARGET_COLOUR
 from kumite.studio.throwing import BELOW, NEAR, aim_along
-from kumite.studio.wording import EventLog, describe, place, score_html, struck
+from kumite.studio.wording import EventLog, score_html, struck
 from tests import browser
 from tests.shared import builtin
+from tests.telling import event
 from tests.test_studio import wait
 
 
@@ -105,8 +107,9 @@ def test_clicks_wait_for_the_thread_that_steps(avoiders: Layer):
         assert kinds(stage)[:2] == ["throw", "throw"] and not throws.waiting
         first, other = stage.objects[:2]
         assert first.radius == other.radius == 0.2
-        assert stage.events[0].data["place"][1] == pytest.approx(EYE[1] - BELOW, abs=0.15)
-        assert stage.events[0].data["speed"] == pytest.approx(12.0, rel=0.05)
+        told = stage.events[0]
+        assert isinstance(told, Throw) and told.speed == pytest.approx(12.0, rel=0.05)
+        assert told.place[1] == pytest.approx(EYE[1] - BELOW, abs=0.15)
     finally:
         studio.close()
 
@@ -117,11 +120,11 @@ def test_throws_by_hand_leave_the_stream_as_it_is(avoiders: Layer):
     for _ in range(240):
         by_itself.step()
         helped.step()
-    first = next(e for e in by_itself.events if e.kind == "throw")
-    second = [e for e in helped.events if e.kind == "throw"][1]
+    first = next(e for e in by_itself.events if isinstance(e, Throw))
+    second = [e for e in helped.events if isinstance(e, Throw)][1]
     assert first.frame == second.frame == 60
     # Who is aimed at may stand otherwise by now; where from is drawn from the same numbers.
-    assert first.data["place"][1] == second.data["place"][1]
+    assert first.place[1] == second.place[1]
     assert helped.objects[0].radius == 0.3 and helped.objects[1].radius == 0.11
 
 
@@ -265,10 +268,12 @@ def test_an_attack_is_shown_along_its_way():
 
 def test_what_is_said_of_a_throw_and_a_search():
     def said(kind: str, **data) -> str:
-        return describe(Event(1, kind, "dodger", data))
+        ball = {} if kind in ("throw", "decision") else {"ball": "ball 1"}
+        return describe(event(1, kind, "dodger", {**ball, **data}))
 
     assert said("throw", attack=3, speed=9.96, ball="ball 1") == "ball 3 is thrown, 10.0 m/s"
     assert said("avoided", attack=3) == "ball 3 is avoided"
+    assert said("avoided", attack=3, ball=None, attacker="red") == "red's blow is avoided"
     assert said("missed", attack=4) == "ball 4 comes near nobody"
     assert said("struck", attack=3, part="left_shin", speed=9.0, meant=True) == (
         "ball 3 → left shin, 9.0 m/s"
@@ -298,11 +303,10 @@ def test_throws_are_counted(avoiders: Layer):
     assert log.thrown["dodger"] == 8 == log.avoided["dodger"] + log.struck["dodger"]
     html = score_html(log)
     assert "avoided" in html and "strikes" not in html
-    met = [e for e in stage.events if e.kind == "struck"]
-    for event in met:
-        where = place(event)
-        assert struck(event) == "dodger" and where is not None
-        assert np.linalg.norm(np.array(where) - [0, where[1], 0]) < 2.5
+    met = [e for e in stage.events if isinstance(e, Struck)]
+    for ball in met:
+        assert struck(ball) == "dodger"
+        assert np.linalg.norm(np.array(ball.place) - [0, ball.place[1], 0]) < 2.5
 
 
 # Many, and recordings ----------------------------------------------------------------------------
@@ -359,8 +363,8 @@ def test_a_click_throws_a_ball_and_switches_show_volumes(avoiders: Layer):
         eye = studio.from_page(client.camera.position)
         page.mouse.click(*browser.project(studio.seen_at(chest), client.camera, page))
         assert wait(lambda: "throw" in kinds(stage))
-        event = next(e for e in stage.events if e.kind == "throw")
-        assert np.linalg.norm(np.array(event.data["place"]) - eye) < 0.8
+        event = next(e for e in stage.events if isinstance(e, Throw))
+        assert np.linalg.norm(np.array(event.place) - eye) < 0.8
         thrower, attack = stage.balls, stage.balls.attack[0]
         assert attack is not None and thrower.thrown == 1
         gap = np.linalg.norm(attack.centre[:, 0] - chest, axis=1).min()

@@ -22,12 +22,14 @@ from kumite.scene import (
     save_recording,
 )
 from kumite.scene import prepare as scenes
-from kumite.scene.recording import Event
+from kumite.scene.events import Decision, Done, Hit, Launch, Passed
+from kumite.scene.wording import describe
 from kumite.studio import Studio
 from kumite.studio.leading import DOWN, LEFT, NEAR, RIGHT, STEP, UP, Leader, meant, way_seen
-from kumite.studio.wording import EventLog, describe, lines_html, score_html
+from kumite.studio.wording import EventLog, lines_html, score_html
 from tests import browser
 from tests.shared import builtin
+from tests.telling import event
 from tests.test_studio import wait
 
 Make = Callable[..., PrepareScene]
@@ -140,10 +142,11 @@ def test_a_click_sends_a_walker_to_a_place_or_to_a_ball(make: Make):
     assert steps(stage, lambda: stage.walkers.alpha[0] > 0.7, 1200), "it does not prepare"
     for _ in range(120):
         stage.step()
-    assert stage.events == [], "the motion is not begun by itself"
+    decided = all(isinstance(e, Decision) for e in stage.events)
+    assert decided, "the motion is not begun by itself"
     assert leader.trigger("kick_ball") is None
     assert leader.trigger("punch") == "kick_ball"
-    assert steps(stage, lambda: any(e.kind == "hit" for e in stage.events), 120)
+    assert steps(stage, lambda: any(isinstance(e, Hit) for e in stage.events), 120)
 
 
 def test_an_arrow_sends_a_walker_a_few_steps(make: Make):
@@ -175,8 +178,8 @@ def test_who_goes_by_itself_first_goes_where_it_is_sent(make: Make, monkeypatch)
     place = np.array([0.0, -4.0])
     stage.go(0, place)
     assert steps(stage, lambda: bool(np.isnan(stage.told[0, 0])), 900)
-    assert away(stage, place) < 0.85 and stage.events == []
-    assert steps(stage, lambda: any(e.kind == "hit" for e in stage.events), 1200)
+    assert away(stage, place) < 0.85 and all(isinstance(e, Decision) for e in stage.events)
+    assert steps(stage, lambda: any(isinstance(e, Hit) for e in stage.events), 1200)
     # Where nobody ever arrives it gives up 5 s after it has got as near as it does.
     monkeypatch.setattr(scenes, "ARRIVED", -1.0)
     stage = make("ball-kick")
@@ -194,8 +197,8 @@ def test_who_goes_by_itself_first_goes_where_it_is_sent(make: Make, monkeypatch)
 def test_a_thing_that_was_chosen_takes_nobodys_turn(make: Make):
     stage = make("obstacle-course")
     stage.go_to(0, "bar")
-    assert steps(stage, lambda: any(e.kind == "passed" for e in stage.events), 2400)
-    assert stage.events[-1].data["thing"] == "bar"
+    assert steps(stage, lambda: any(isinstance(e, Passed) for e in stage.events), 2400)
+    assert next(e for e in stage.events if isinstance(e, Passed)).thing == "bar"
     stage.step()
     assert steps(stage, lambda: stage.thing[0] >= 0, 600)
     assert stage.things.names[stage.thing[0]] == "beam"
@@ -213,7 +216,7 @@ def test_who_is_led_through_a_brawl_prepares_for_the_nearest_opponent(make: Make
         chosen = np.hypot(*(stage.walkers.facing[1:, :2] - source).T)
         assert chosen.min() < 0.1 and off[chosen.argmin()] < off.min() + 0.6
         assert np.allclose(stage.walkers.goal[0, :2], [0.0, 9.0])
-    assert not any(e.kind == "launch" for e in stage.events), "it is led"
+    assert not any(isinstance(e, Launch) for e in stage.events), "it is led"
 
 
 # What is seen ------------------------------------------------------------------------------------
@@ -250,7 +253,7 @@ def test_motions_are_begun_where_and_as_the_posture_is_shown(make: Make, name: s
         assert prepared is not None
         prepared.asked.posture = prepared.asked.support = True
         shown, there, mine = prepared.look(), np.zeros(3), np.zeros(3)
-        while not any(e.kind == "launch" for e in stage.events):
+        while not any(isinstance(e, Launch) for e in stage.events):
             shown = prepared.look()
             ghost = prepared.posture(shown.target)
             x, z, yaw = shown.begins
@@ -341,7 +344,7 @@ def test_a_ball_is_dragged_along_the_floor(make: Make):
 
 def test_what_is_said_of_preparing():
     def said(kind: str, **data) -> str:
-        return describe(Event(1, kind, "anna", data))
+        return describe(event(1, kind, "anna", data))
 
     launch = {"motion": "kick_ball", "level": 0.831, "apart_deg": 1.92, "to_contact": 0.6}
     begins = "kick ball, prepared to 0.83, 1.9° from its posture; contact in 0.60 s"
@@ -361,8 +364,8 @@ def test_what_is_said_of_preparing():
 def test_a_recording_is_shown_and_counted(make: Make, tmp_path: Path):
     stage = make("ball-kick", seed=201)
     recording = record(stage, 15.0)
-    done = sum(e.kind == "done" for e in recording.events)
-    hits = sum(e.kind == "hit" for e in recording.events)
+    done = sum(isinstance(e, Done) for e in recording.events)
+    hits = sum(isinstance(e, Hit) for e in recording.events)
     assert done >= 1 and hits >= 1
     save_recording(tmp_path / "k.rec", recording)
     studio = Studio(Playback(load_recording(tmp_path / "k.rec")), port=0)
@@ -436,13 +439,13 @@ def test_clicks_and_keys_lead_a_walker(make: Make):
         assert wait(lambda: bool((stage.told[0] - stage.walkers.facing[0, :2]) @ ahead > 1.0))
 
         page.keyboard.press("6")
-        assert wait(lambda: any(e.data.get("motion") == "punch" for e in stage.events))
+        assert wait(lambda: any(getattr(e, "motion", None) == "punch" for e in stage.events))
         studio.step_once()  # it waits in its punch, however slow the page is
         browser.wait_until(page, lambda: "punch, prepared to" in page.inner_text("body"), "a line")
         page.get_by_role("button", name="5 front kick").click()
         browser.wait_until(page, lambda: "Busy" in page.inner_text("body"), "busy")
         assert "anna does punch" in page.inner_text("body")
-        assert sum(e.kind == "launch" for e in stage.events) == 1
+        assert sum(isinstance(e, Launch) for e in stage.events) == 1
         studio.toggle()
         browser.wait_until(page, lambda: "is done" in page.inner_text("body"), "the end of it")
         page.get_by_label("By itself", exact=True).click()

@@ -46,7 +46,13 @@ def guide(targets: Layer, tmp_path_factory: pytest.TempPathFactory) -> Guide:
 
 
 def some_walkers(guide: Guide, homes: np.ndarray, preparation: str = "ours") -> Walkers:
-    return Walkers(guide, homes, lambda kind, k, **data: None, preparation=preparation)
+    return Walkers(
+        guide,
+        [f"w{k}" for k in range(len(homes))],
+        homes,
+        lambda event: None,
+        preparation=preparation,
+    )
 
 
 def tip_at(library: Layer, frame: int, limb: int) -> np.ndarray:
@@ -327,7 +333,7 @@ def test_each_target_is_prepared_for_with_its_own_curve(guide: Guide):
     head, count = clips.skeleton.joint("head"), len(guide.policy_of)
     curve = np.full((count, len(clips.skeleton)), 0.5)
     curve[:, head] = np.linspace(0.25, 2.0, count)
-    w = Walkers(guide, np.zeros((1, 3)), lambda kind, k, **data: None, curve=curve)
+    w = Walkers(guide, ["w"], np.zeros((1, 3)), lambda event: None, curve=curve)
     w.heeds[:] = False
     for t in range(count):
         w.wants[:] = t

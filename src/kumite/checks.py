@@ -7,12 +7,23 @@ one need not look again.
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 import numbers
 import operator
-from collections.abc import Iterable, Mapping, Sequence
+import types
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf, isfinite, nan
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 from kumite.errors import KumiteError
 from kumite.lazy import Later
@@ -24,6 +35,7 @@ else:
 
 T = TypeVar("T")
 Size = int | str  # of one axis of an array; a letter stands for any, the same one everywhere
+Check = Callable[[Any, str], Any]  # of a value and what it is; the value as it is wanted
 
 FAR = 1e9  # m, or units of a file: nobody and nothing is farther away
 UNIT_WITHIN = 1e-3  # by which a quaternion's length may differ from 1
@@ -71,9 +83,12 @@ def number(
     Errors: no number, NaN, infinite, out of range.
     """
     try:
-        if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        if type(value) is float:
+            found = value
+        elif isinstance(value, bool) or not isinstance(value, numbers.Real):
             raise TypeError
-        found = float(value)
+        else:
+            found = float(value)
     except (TypeError, ValueError, OverflowError):
         found = nan
     if not (isfinite(found) and least <= found <= most and found > above):
@@ -99,6 +114,13 @@ def whole(value: object, what: str, *, least: int | None = None, most: int | Non
         limits += [f"at most {most}"] if most is not None else []
         raise KumiteError(f"{what}: {shown(value)}; expected {' and '.join(limits)}")
     return found
+
+
+def flag(value: object, what: str) -> bool:
+    """True or false. Errors: it is neither."""
+    if not isinstance(value, bool | np.bool_):
+        raise KumiteError(f"{what}: {shown(value)}; expected true or false")
+    return bool(value)
 
 
 def fps(value: object, what: str) -> float:
@@ -262,9 +284,143 @@ def freeze_mapping(
         if key not in keys:
             raise KumiteError(f"{what}: {shown(key)}; expected one of {', '.join(keys)}")
         instance(value, of, f"{what}: {key}")
-    kept = MappingProxyType({key: given[key] for key in keys if key in given})
+    kept = types.MappingProxyType({key: given[key] for key in keys if key in given})
     object.__setattr__(record, field, kept)
     return kept
+
+
+# By annotation -----------------------------------------------------------------------------------
+
+
+def rounded(digits: int) -> Check:
+    """For ``Annotated``: a number, or each of several, to so many digits after the point."""
+
+    def to_digits(value: Any, what: str) -> Any:
+        if isinstance(value, tuple):
+            return tuple(round(v, digits) for v in value)
+        return round(value, digits)
+
+    return to_digits
+
+
+def one_of(*choices: str) -> Check:
+    """For ``Annotated``: one of several words."""
+
+    def check(value: str, what: str) -> str:
+        if value not in choices:
+            raise KumiteError(f"{what}: {shown(value)}; expected one of {', '.join(choices)}")
+        return value
+
+    return check
+
+
+def above_zero(value: float, what: str) -> float:
+    """For ``Annotated``: a number more than 0. Errors: it is not."""
+    return number(value, what, above=0.0)
+
+
+@functools.cache
+def annotated(kind: type) -> tuple[tuple[str, Check], ...]:
+    """The fields of a dataclass or a TypedDict, and what each annotation asks for."""
+    return tuple((name, of_type(hint)) for name, hint in _annotations(kind).items())
+
+
+def _annotations(kind: type) -> dict[str, Any]:
+    hints = get_type_hints(kind, include_extras=True)
+    if dataclasses.is_dataclass(kind):
+        return {f.name: hints[f.name] for f in dataclasses.fields(kind)}
+    return hints
+
+
+def check_fields(record: object, what: str) -> None:
+    """Check a frozen dataclass' fields by their annotations, in place. Errors: told as what's."""
+    for name, passed, default, check in _checked(type(record)):
+        given = getattr(record, name)
+        if type(given) in passed or given is default:  # most are: thousands are made a second
+            continue
+        found = check(given, f"{what}: {name}")
+        if found is not given:
+            object.__setattr__(record, name, found)
+
+
+@functools.cache
+def _checked(kind: type) -> tuple[tuple[str, frozenset[type], Any, Check], ...]:
+    """Of each field: its name, types of which every value will do, its default, its check."""
+    defaults = {f.name: f.default for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
+    return tuple(
+        (name, _will_do(hint), defaults[name], of_type(hint))
+        for name, hint in _annotations(kind).items()
+    )
+
+
+def _will_do(annotation: Any) -> frozenset[type]:
+    if get_origin(annotation) in (Union, types.UnionType):
+        return frozenset().union(*(_will_do(a) for a in get_args(annotation)))
+    return frozenset({annotation} & {bool, int, type(None)})
+
+
+def of_type(annotation: Any) -> Check:
+    """What checks a value of a type: a plain one, a union, a tuple, a mapping by names, or
+    ``Annotated`` with more checks, which are made in order.
+    """
+    origin, args = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        first, *more = of_type(args[0]), *args[1:]
+
+        def in_order(value: Any, what: str) -> Any:
+            value = first(value, what)
+            for check in more:
+                value = check(value, what)
+            return value
+
+        return in_order
+    if origin in (Union, types.UnionType):
+        return _union([a for a in args if a is not type(None)], type(None) in args)
+    if origin is tuple:
+        return _items(args)
+    if origin is not None and issubclass(origin, Mapping):
+        each = of_type(args[1])
+        return lambda value, what: {
+            name: each(part, f"{what} of {name!r}") for name, part in mapping(value, what).items()
+        }
+    return _PLAIN[annotation]
+
+
+_PLAIN: dict[Any, Check] = {
+    bool: flag,
+    int: whole,
+    float: number,
+    str: text,
+    Any: lambda value, what: value,
+}
+
+
+def _union(kinds: list[Any], none: bool) -> Check:
+    several = [of_type(kind) for kind in kinds]
+
+    def any_of(value: Any, what: str) -> Any:
+        if none and value is None:
+            return None
+        if len(several) == 1:
+            return several[0](value, what)
+        errors = []
+        for check in several:
+            try:
+                return check(value, what)
+            except KumiteError as error:
+                errors.append(error)
+        raise errors[0]
+
+    return any_of
+
+
+def _items(kinds: tuple[Any, ...]) -> Check:
+    """Of a tuple: so many values, or any number of one kind."""
+    kind, any_number = kinds[0], kinds[-1] is ...
+    if kind is str:
+        return lambda value, what: names(value, what, unlike=False)
+    shape: tuple[Size, ...] = ("N",) if any_number else (len(kinds),)
+    return lambda value, what: tuple(array(value, what, shape, kind).tolist())
 
 
 def _refuse_shape(found: tuple[int, ...], what: str, shape: tuple[Size | Any, ...]) -> None:

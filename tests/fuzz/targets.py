@@ -60,10 +60,13 @@ from kumite.scene import (
     save_recording,
 )
 from kumite.scene import recording as recordings
+from kumite.scene.events import Hit, Struck
 from kumite.scene.recording import Recording
 from kumite.scene.reports import reports
-from kumite.studio.wording import EventLog, describe, lines_html, place, score_html, struck
+from kumite.scene.wording import describe
+from kumite.studio.wording import EventLog, lines_html, score_html, struck
 from tests.fuzz import mutate
+from tests.telling import THINGS, one_of_each
 from tests.test_asfamc import AMC, ASF
 
 Rng = np.random.Generator
@@ -102,35 +105,13 @@ def fight() -> Recording:
     """Two who spar, with a ball and an event of every kind that is told."""
     scene = LiveScene(load_scene("sparring"), libraries()["frames"], seed=1)
     made = record(scene, 2.0)
-    at = {"place": [0.1, 1.4, 0.2], "speed": 6.5, "time": 0.5}
-    more = [
-        ("hit", {"victim": "blue", "limb": "left_hand", "part": "head", "blocked": True, **at}),
-        ("throw", {"attack": 1, "ball": "ball 1", **at}),
-        ("avoidance", {"attack": 1, "outcome": "found", "aim": 0.4, "candidates": 5, "valid": 2,
-                       "costs": [0.1, 0.2, 0.3], "cost": 0.6, "distance": 0.2, "indexed": True}),
-        ("avoidance", {"attack": 2, "outcome": "too late", "hit": 3}),
-        ("avoided", {"attack": 1}),
-        ("missed", {"point": 1, "due": None, "by": 0.3}),
-        ("struck", {"attack": 2, "part": "chest", "meant": False, **at}),
-        ("stale", {"attack": 3, "dropped": 2}),
-        ("launch", {"motion": "kick_ball", "level": 0.5, "apart_deg": 3.0, "to_contact": 0.4,
-                    "bent": 0.05}),
-        ("done", {"motion": "kick_ball"}),
-        ("passed", {"thing": "beam", "clearance": 0.03}),
-        ("touched", {"thing": "beam", "part": "head"}),
-        ("moved goal", {"thing": "beam"}),
-        ("reaction", {"action": "hit", "size": "small", "impulse": 3.0, "deviation": None}),
-        ("check point", {"point": 1, "late_by": 0.1, "distance": 0.3}),
-        ("cue", {"style": {"preset": "boxer"}, "only": ["idle"]}),
-    ]  # fmt: skip
-    events = [recordings.Event(k, kind, "red", data) for k, (kind, data) in enumerate(more)]
     frames = len(made)
     return replace(
         made,
-        objects=("ball 1", "car", "beam"),
+        objects=THINGS,
         object_position=np.full((frames, 3, 3), 0.5, np.float32),
         rate=np.ones((frames, 2), np.float32),
-        events=(*made.events, *events),
+        events=(*made.events, *one_of_each()),
         settings={
             **made.settings,
             "object_radius": {"ball 1": 0.1},
@@ -239,8 +220,8 @@ def forged_recording(rng: Rng, folder: Path) -> None:
     while stage.step():
         for event in log.update(stage.events, stage.frame):
             describe(event)
-            if event.kind in ("hit", "struck"):
-                struck(event), place(event)
+            if isinstance(event, Hit | Struck):
+                struck(event)
         lines_html(log, stage.fps)
     score_html(log)
     if _looks_deep(8):

@@ -13,19 +13,37 @@ import numpy as np
 
 from kumite.clip import LIMBS, Skeleton, forward_kinematics
 from kumite.errors import unknown
-from kumite.scene.recording import Event, Recording
+from kumite.scene.events import (
+    KINDS,
+    Attacked,
+    Avoided,
+    Caught,
+    CheckPointReached,
+    Event,
+    EventIndex,
+    Hit,
+    Launch,
+    Missed,
+    Passed,
+    RunOver,
+    Strike,
+    Struck,
+    Throw,
+    Touched,
+)
+from kumite.scene.recording import Recording
 from kumite.scene.reports import found_ways_out
+from kumite.scene.wording import describe
 
 EVENLY = "evenly"
 GROUPS = {
-    "hits": ("hit", "struck"),
-    "avoided": ("avoided",),
-    "blows": ("strike",),
-    "launches": ("launch",),
-    "passed": ("passed", "touched"),
+    "hits": (Hit, Struck),
+    "blows": (Strike,),
+    "launches": (Launch,),
+    "passed": (Passed, Touched),
 }
 """Words for kinds of events; every kind is a word for itself, too."""
-TELLING = ("hit", "struck", "avoided", "passed", "caught", "run over", "check point")
+TELLING = (Hit, Struck, Avoided, Passed, Caught, RunOver, CheckPointReached)
 """What is shown unless something is asked for."""
 TRAIL = 0.3  # s of the way that what strikes has come
 PASSING = 4.0  # s before an obstacle counts as passed in which it may have been
@@ -51,19 +69,19 @@ def moments(recording: Recording, at: str | None = None, most: int = 12) -> list
 
     Errors: no event of that kind.
     """
-    held = {e.kind for e in recording.events}
-    kinds = set(TELLING) & held if at is None else set(GROUPS.get(at, (at,)))
-    found = [e for e in recording.events if e.kind in kinds]
+    held = {type(e) for e in recording.events}
+    wanted = TELLING if at is None else GROUPS.get(at, (KINDS[at],) if at in KINDS else ())
     ways_out = found_ways_out(recording.events)
+    found = [e for e in recording.events if isinstance(e, wanted)]
     if ways_out:  # who was only lucky has not avoided anything that is worth a picture
         found = [
-            e for e in found if e.kind != "avoided" or (e.data["attack"], e.character) in ways_out
+            e for e in found if not isinstance(e, Avoided) or (e.attack, e.character) in ways_out
         ]
     if at == EVENLY or (at is None and not found):
         frames = np.unique(np.linspace(0, len(recording) - 1, most).round().astype(int))
         return [Moment(f) for f in frames.tolist()]
     if not found:
-        words = sorted({w for w, ks in GROUPS.items() if held & set(ks)} | held)
+        words = {w for w, kinds in GROUPS.items() if held & set(kinds)} | {k.kind for k in held}
         raise unknown("event to show", str(at), [*words, EVENLY])
     found = _picked(found, most)
     return sorted((_moment(recording, e) for e in found), key=lambda m: m.frame)
@@ -77,65 +95,68 @@ def _picked(found: list[Event], most: int) -> list[Event]:
 
 
 def _moment(recording: Recording, event: Event) -> Moment:
-    k = recording.names.index(event.character)
-    data, last = event.data, len(recording) - 1
-    frame = min(event.frame, last)
-    if event.kind == "hit":
-        frame = min(round(float(data["time"]) * recording.fps), last)
-        victim, part = str(data["victim"]), str(data["part"]).replace("_", " ")
-        limb = str(data["limb"]).replace("_", " ")
-        blocked = bool(data.get("blocked"))
-        where = victim if part == victim else f"{victim}'s {part}"
-        text = f"{event.character}: {limb} to {where}, {float(data['speed']):.1f} m/s"
-        return Moment(
-            frame,
-            f"{text}, blocked" if blocked else text,
-            (k, *_index(recording, victim)),
-            np.array(data["place"]),
-            blocked,
-            _tip(recording, k, str(data["limb"]), frame),
-        )
-    if event.kind == "struck":
-        part = str(data["part"]).replace("_", " ")
-        ball = _ball_of(recording, data["attack"], frame)
-        text = f"{event.character}: struck on the {part}, {float(data['speed']):.1f} m/s"
-        trail = _way(recording.object_position, ball, frame, recording.fps)
-        return Moment(frame, text, (k,), np.array(data["place"]), False, trail)
-    if event.kind in ("avoided", "missed") and "attack" in data:
-        return _escape(recording, event, k, frame)
-    if event.kind in ("passed", "touched"):
-        thing = recording.objects.index(data["thing"])
-        begin = max(0, frame - round(PASSING * recording.fps))
-        way = recording.root_position[begin : frame + 1, k]
-        way = way - recording.object_position[begin, thing]
-        frame = begin + int(np.hypot(way[:, 0], way[:, 2]).argmin())
-        clear = f", {100 * data['clearance']:.0f} cm clear" if "clearance" in data else ""
-        text = f"{event.character}: {event.kind} the {data['thing']}{clear}"
-        return Moment(frame, text, (k,), thing=thing)
-    other = _index(recording, str(data.get("victim", data.get("at", ""))))
-    more = next((str(data[n]) for n in ("motion", "action", "victim", "point") if n in data), "")
-    text = f"{event.character}: {event.kind} {more}".replace("_", " ").rstrip()
-    return Moment(frame, text, (k, *other))
+    who, last = event.character, len(recording) - 1
+    k, frame = recording.names.index(who), min(event.frame, last)
+    match event:
+        case Hit():
+            return _landing(recording, event, k)
+        case Struck():
+            part = event.part.replace("_", " ")
+            text = f"{who}: struck on the {part}, {event.speed:.1f} m/s"
+            trail = _way(recording.object_position, _ball(recording, event), frame, recording.fps)
+            return Moment(frame, text, (k,), np.array(event.place), False, trail)
+        case Avoided() | Missed():
+            return _escape(recording, event, k, frame)
+        case Passed() | Touched():
+            clear = f", {100 * event.clearance:.0f} cm clear" if isinstance(event, Passed) else ""
+            text = f"{who}: {event.kind} the {event.thing}{clear}"
+            return _beside(recording, event.thing, k, frame, text)
+    victim = getattr(event, "victim", None)
+    other = () if victim is None else _index(recording, victim)
+    return Moment(frame, f"{who}: {describe(event)}", (k, *other))
 
 
-def _escape(recording: Recording, event: Event, k: int, end: int) -> Moment:
+def _landing(recording: Recording, hit: Hit, k: int) -> Moment:
+    """A blow, when it lands between two frames."""
+    frame = min(round(hit.time * recording.fps), len(recording) - 1)
+    where = hit.victim if hit.part == hit.victim else f"{hit.victim}'s {hit.part}"
+    text = f"{hit.character}: {hit.limb} to {where}, {hit.speed:.1f} m/s".replace("_", " ")
+    return Moment(
+        frame,
+        f"{text}, blocked" if hit.blocked else text,
+        (k, *_index(recording, hit.victim)),
+        np.array(hit.place),
+        hit.blocked,
+        _tip(recording, k, hit.limb, frame),
+    )
+
+
+def _beside(recording: Recording, name: str, k: int, end: int, text: str) -> Moment:
+    """When a character came nearest to a thing."""
+    thing = recording.objects.index(name)
+    begin = max(0, end - round(PASSING * recording.fps))
+    way = recording.root_position[begin : end + 1, k] - recording.object_position[begin, thing]
+    frame = begin + int(np.hypot(way[:, 0], way[:, 2]).argmin())
+    return Moment(frame, text, (k,), thing=thing)
+
+
+def _escape(recording: Recording, event: Avoided | Missed, k: int, end: int) -> Moment:
     """When what was thrown or struck at somebody, who avoided it, came nearest."""
-    attack = event.data["attack"]
-    word = "avoids" if event.kind == "avoided" else "is missed by"
-    blow = [e for e in recording.events if e.kind == "strike" and e.data.get("attack") == attack]
+    word = "avoids" if isinstance(event, Avoided) else "is missed by"
+    told = EventIndex(recording.events)
+    blow = [e for e in told.of(Strike) if e.attack == event.attack]
     if blow:
-        a, limb = recording.names.index(blow[0].character), str(blow[0].data["limb"])
+        a, limb = recording.names.index(blow[0].character), blow[0].limb
         begin = min(blow[0].frame, end)
         tip = _tips(recording, a, limb, begin, end + 1)
         frame = begin + _nearest(recording, k, tip, begin)
         text = f"{event.character} {word} {blow[0].character}'s {limb.replace('_', ' ')}"
         return Moment(frame, text, (k, a), trail=_tip(recording, a, limb, frame))
-    ball = _ball_of(recording, attack, end)
+    ball = _ball(recording, event)
     if ball is None:
         return Moment(end, f"{event.character} {word} an attack", (k,))
     begin = max(0, end - round(FLIGHT * recording.fps))
-    thrown = [e for e in recording.events if e.kind == "throw" and e.data["attack"] == attack]
-    begin = max(begin, thrown[0].frame)
+    begin = max(begin, *(e.frame for e in told.of(Throw) if e.attack == event.attack))
     frame = begin + _nearest(recording, k, recording.object_position[begin : end + 1, ball], begin)
     trail = _way(recording.object_position, ball, frame, recording.fps)
     return Moment(frame, f"{event.character} {word} a ball", (k,), trail=trail)
@@ -145,14 +166,9 @@ def _index(recording: Recording, name: str) -> tuple[int, ...]:
     return (recording.names.index(name),) if name in recording.names else ()
 
 
-def _ball_of(recording: Recording, attack: int, frame: int) -> int | None:
-    """The ball of a throw."""
-    names = [
-        e.data["ball"]
-        for e in recording.events
-        if e.kind == "throw" and e.data["attack"] == attack and e.frame <= frame
-    ]
-    return recording.objects.index(names[-1]) if names else None
+def _ball(recording: Recording, event: Attacked) -> int | None:
+    """The object that is thrown."""
+    return None if event.ball is None else recording.objects.index(event.ball)
 
 
 def _way(position: np.ndarray, thing: int | None, frame: int, fps: float) -> np.ndarray:

@@ -2,10 +2,11 @@ from kumite.scene.actions import ActionPlayback, action_recording
 from kumite.scene.bout import BoutScene
 from kumite.scene.dodge import DodgeScene
 from kumite.scene.evasion import EvasionScene
+from kumite.scene.events import Event, EventIndex
 from kumite.scene.live import LiveScene
 from kumite.scene.metrics import CharacterMetrics, Metrics, measure
 from kumite.scene.prepare import PrepareScene
-from kumite.scene.recording import Event, Recording, load_recording, save_recording
+from kumite.scene.recording import Recording, load_recording, save_recording
 from kumite.scene.run import record
 from kumite.scene.settings import (
     SceneSettings,
@@ -25,6 +26,7 @@ __all__ = [
     "DodgeScene",
     "EvasionScene",
     "Event",
+    "EventIndex",
     "LiveScene",
     "Metrics",
     "Playback",

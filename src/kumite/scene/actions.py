@@ -7,11 +7,11 @@ from functools import cached_property
 import numpy as np
 
 from kumite.annotate import Actions
-from kumite.clip import LIMBS
 from kumite.errors import KumiteError
 from kumite.graph import Layer
 from kumite.rotation import from_yaw, multiply, planar_apply, planar_inverse
-from kumite.scene.recording import Event, Recording
+from kumite.scene.events import strike
+from kumite.scene.recording import Recording
 from kumite.scene.stage import Playback
 
 WHO = "actor"
@@ -43,16 +43,8 @@ def action_recording(library: Layer, action: int) -> Recording:
         contacts=library.contacts.on_ground[a:b, None],
         library_frame=np.arange(a, b)[:, None],
         events=tuple(
-            Event(
-                int(strikes.frame[x]) - a,
-                "strike",
-                WHO,
-                {
-                    "limb": LIMBS[strikes.limb[x]],
-                    "speed": round(float(np.linalg.norm(strikes.velocity[x])), 4),
-                },
-            )
-            for x in blows
+            strike(int(strikes.frame[x]) - a, WHO, int(strikes.limb[x]), x, strikes)
+            for x in blows.tolist()
         ),
         settings={"library": library.digest},
     )

@@ -20,6 +20,7 @@ from kumite.errors import KumiteError
 from kumite.graph import Layer
 from kumite.kernels.blow import NO_BLOW
 from kumite.rotation import planar_apply, planar_inverse, rotate, wrap_angle
+from kumite.scene.events import Decision
 from kumite.scene.recording import Recording
 from kumite.scene.settings_dodge import AttackerSettings
 from kumite.synthesis import Cast
@@ -74,11 +75,13 @@ class Attackers:
         self.next = np.full(len(settings), -1)  # [A] the stretch that each takes next, -1: any
         self._known: dict[tuple[int, int, int], int] = {}  # blows told of -> frames of them
 
-    def decide(self, k: int, target: np.ndarray, bodies: np.ndarray) -> tuple[int, float]:
-        """What character k does after its present action: the stretch and its worth.
+    def decide(
+        self, k: int, target: np.ndarray, bodies: np.ndarray, frame: int, name: str
+    ) -> Decision:
+        """What character k, of a name, does after its present action.
 
         target [H, 4]: where what it aims at is expected then, and the way that faces; bodies
-        [O, H, 2]: roots to keep off, both in the scene.
+        [O, H, 2]: roots to keep off, both in the scene; frame: of the scene, now.
         """
         cast, table = self.cast, self.library.table
         here = cast.facing_at(cast.stop)[k]
@@ -90,7 +93,18 @@ class Attackers:
         others = np.ascontiguousarray(planar_apply(to_here, flat)[..., [0, 2]])
         state = int(np.searchsorted(table.state_frame, cast.stop[k]))
         self.next[k] = self.fighters.pick(k, state, seen, others)
-        return int(self.next[k]), float(self.fighters.choices.worth[k])
+        stretch, choices = int(self.next[k]), self.fighters.choices
+        return Decision(
+            frame,
+            name,
+            by="policy",
+            state=state,
+            stretch=stretch,
+            worth=float(choices.worth[k]),
+            considered=int(choices.considered[k]),
+            apart=int(choices.apart[k]),
+            jump=bool(table.first[stretch] != cast.stop[k] + 1),
+        )
 
     def begin(self, k: int) -> int:
         """Character k takes what it has decided on; the stretch."""

@@ -30,6 +30,7 @@ from kumite.graph import Layer, Library
 from kumite.kernels.blow import NO_BLOW, NOBODY
 from kumite.kernels.moves import FALL, NOTHING
 from kumite.rotation import planar_compose
+from kumite.scene import events
 from kumite.scene.apart import push_apart
 from kumite.scene.controls import (
     ORDERS,
@@ -39,12 +40,20 @@ from kumite.scene.controls import (
     style_controls,
 )
 from kumite.scene.doors import check_scene
+from kumite.scene.events import (
+    Caught,
+    CheckPointMissed,
+    CheckPointReached,
+    Cue,
+    Event,
+    Hit,
+    RunOver,
+)
 from kumite.scene.floor import Floor, Landing
 from kumite.scene.reactions import MOST_PHYSICAL, Reactions
-from kumite.scene.recording import Event
 from kumite.scene.settings import SceneSettings
 from kumite.scene.settings_base import ARENA, NEAREST
-from kumite.scene.settings_fight import BoutSettings, CueSettings
+from kumite.scene.settings_fight import CHANGES, BoutSettings, CueSettings
 from kumite.scene.stage import SceneObject
 from kumite.scene.story import Story
 
@@ -203,7 +212,8 @@ class BoutScene:
             self._catch()
         if happened:
             for k, s, blow in self.floor.thrown:
-                self._event("strike", k, limb=LIMBS[s], blow=blow)
+                strikes = self.library.strikes
+                self.events.append(events.strike(self.frame, self.names[k], s, blow, strikes))
             for landing in self.floor.landings:
                 self._land(landing)
         return True
@@ -248,19 +258,22 @@ class BoutScene:
         self.decisions.append(decision)
         self._recent[k].append(decision.stretch)
         self._begin(k, decision.stretch)
-        self._event(
-            "decision",
-            k,
-            action=self.tree.labels[decision.stretch],
-            stretch=decision.stretch,
-            comp=float(f"{decision.comp:.6g}"),
-            coop=float(f"{decision.coop:.6g}"),
-            nodes=int(decision.nodes.sum()),
-            considered=int(decision.considered.sum()),
-            pruned=round(decision.pruned, 4),
-            jump=bool(cast.jump[k]),
-            **({"outside_set": True} if decision.outside else {}),
-            **({"flaws": ", ".join(decision.flaws)} if decision.flaws else {}),
+        self.events.append(
+            events.Decision(
+                self.frame,
+                self.names[k],
+                by="tree",
+                action=self.tree.labels[decision.stretch],
+                stretch=decision.stretch,
+                comp=decision.comp,
+                coop=decision.coop,
+                nodes=int(decision.nodes.sum()),
+                considered=int(decision.considered.sum()),
+                pruned=decision.pruned,
+                jump=bool(cast.jump[k]),
+                outside_set=decision.outside,
+                flaws=", ".join(decision.flaws),
+            )
         )
 
     def _turn_to_nearest(self, k: int) -> None:
@@ -330,20 +343,21 @@ class BoutScene:
     def _land(self, landing: Landing) -> None:
         """A blow has landed: say so, and react to it."""
         part = self.floor.body.parts[landing.part]
-        speed = float(np.linalg.norm(landing.velocity))
         blocked = part in ARMS
         self._landed[landing.who] = landing.blow
-        self._event(
-            "hit",
-            landing.who,
-            victim=self.names[landing.victim],
-            limb=LIMBS[landing.limb],
-            part=part,
-            speed=round(speed, 4),
-            place=[round(float(x), 4) for x in landing.place],
-            time=round((self.frame - 1 + landing.share) / self.fps, 4),
-            blocked=blocked,
-            blow=landing.blow,
+        self.events.append(
+            Hit(
+                self.frame,
+                self.names[landing.who],
+                victim=self.names[landing.victim],
+                limb=LIMBS[landing.limb],
+                part=part,
+                speed=float(np.linalg.norm(landing.velocity)),
+                place=events.place(landing.place),
+                time=(self.frame - 1 + landing.share) / self.fps,
+                blocked=blocked,
+                blow=landing.blow,
+            )
         )
         if self._lies(landing.victim):
             return
@@ -352,7 +366,7 @@ class BoutScene:
             return
         begin = self._does if reaction.begun else self._begin
         begin(landing.victim, reaction.stretch)
-        self._event("reaction", landing.victim, **reaction.told)
+        self.events.append(reaction.told(self.frame, self.names[landing.victim]))
 
     # The story -----------------------------------------------------------------------------------
 
@@ -371,12 +385,12 @@ class BoutScene:
         route = cue.route()
         if route is not None:
             self.progress[k], self._told[k] = Progress(route), 0
-        told = cue.model_dump(exclude={"who", "at", "after", "check_point"}, exclude_none=True)
-        self._event("cue", k, **{name: told[name] for name in told if name != "point"})
+        changes = {name: getattr(cue, name) for name in CHANGES if name != "point"}
+        self.events.append(Cue(self.frame, cue.who, **changes))
 
     def run_over(self, k: int, by: str, speed: float) -> None:
         """Character k falls, struck by a vehicle."""
-        self._event("run over", k, by=by, speed=round(speed, 3))
+        self.events.append(RunOver(self.frame, self.names[k], vehicle=by, speed=speed))
         fall = int(self.tree.response[0, FALL])
         if fall != NOTHING and not self._lies(k):
             self.reactions.forget(k)
@@ -393,9 +407,8 @@ class BoutScene:
         wants = np.array([p.style.preferred_distance for p in self.players])
         near = (far < self.bout.catch) & (wants < wants[opponent])
         for k in np.flatnonzero(near & ~self._caught).tolist():
-            self._event(
-                "caught", k, victim=self.names[opponent[k]], distance=round(float(far[k]), 3)
-            )
+            victim, distance = self.names[opponent[k]], float(far[k])
+            self.events.append(Caught(self.frame, self.names[k], victim=victim, distance=distance))
         self._caught = near | (self._caught & (far < FREE * self.bout.catch))
 
     # Check points --------------------------------------------------------------------------------
@@ -411,22 +424,24 @@ class BoutScene:
             reached = progress.update((float(place[0]), float(place[2])), seconds, self._done[k])
             self._done[k] = set()
             if reached is not None:
-                self._event(
-                    "check point",
-                    k,
-                    point=reached.index,
-                    late_by=round(float(reached.late_by or 0.0), 3),
-                    distance=round(float(reached.distance), 3),
+                self.events.append(
+                    CheckPointReached(
+                        self.frame,
+                        self.names[k],
+                        point=reached.index,
+                        late_by=reached.late_by,
+                        distance=reached.distance,
+                    )
                 )
             for m in progress.missed(seconds):
                 if m.index < self._told[k]:
                     continue
-                due = None if m.due is None else round(float(m.due), 3)
-                self._event("missed", k, point=m.index, due=due, by=round(float(m.distance), 3))
+                self.events.append(
+                    CheckPointMissed(
+                        self.frame, self.names[k], point=m.index, due=m.due, distance=m.distance
+                    )
+                )
                 self._told[k] = m.index + 1
-
-    def _event(self, kind: str, k: int, **data) -> None:
-        self.events.append(Event(self.frame, kind, self.names[k], data))
 
 
 def _is_shared(progress: Progress) -> bool:

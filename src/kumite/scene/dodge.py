@@ -13,8 +13,8 @@ from kumite.scene.balls import Balls, aimed, capsules_of, velocity_to
 from kumite.scene.controls import SearchControl, search_controls
 from kumite.scene.dodgers import Dodgers, background, volume_of
 from kumite.scene.doors import check_scene
+from kumite.scene.events import Avoided, Event, Missed, Searched, Struck, Throw, place
 from kumite.scene.memory import refuse_too_many
-from kumite.scene.recording import Event
 from kumite.scene.settings_dodge import BallsSettings, DodgeSettings
 from kumite.scene.stage import SceneObject
 
@@ -66,7 +66,9 @@ class DodgeScene:
         self.events: list[Event] = []
         homes = np.array([[*d.position, np.radians(d.yaw_deg)] for d in self.settings.dodging])
         rng = np.random.default_rng(self.seed)
-        self.dodgers = Dodgers(self.search, homes, rng, self._event, latency=self.dodge.latency)
+        self.dodgers = Dodgers(
+            self.search, self.names, homes, rng, self._tell, latency=self.dodge.latency
+        )
         # What is thrown does not depend on how it is avoided: searches can be compared.
         self._thrower, self._by_seed = np.random.default_rng([self.seed, 1]), 0
         self._by_hand = np.random.default_rng([self.seed, 2])
@@ -156,14 +158,20 @@ class DodgeScene:
         body = spheres.at(cast.position[at], cast.world_wxyz[at])
         if attack.nearest(body, spheres.radius) < TRUE:
             self._minded.add(number)
-        self._event(
-            "throw", at, attack=number, ball=self.balls.objects[n].name,
-            speed=round(float(np.linalg.norm(velocity)), 3),
-            place=[round(float(x), 4) for x in position],
-        )  # fmt: skip
+        ball = self.balls.objects[n].name
+        self._tell(
+            Throw(
+                self.frame,
+                self.names[at],
+                attack=number,
+                ball=ball,
+                speed=float(np.linalg.norm(velocity)),
+                place=place(position),
+            )
+        )
         for k in range(len(self.names)):
             if self.dodge.searches and (k == at or self._comes_near(attack, k)):
-                self.dodgers.menace(k, attack, number)
+                self.dodgers.menace(k, attack, number, ball=ball)
 
     def _comes_near(self, attack, k: int) -> bool:
         off = attack.centre[:, 0, [0, 2]] - self.root_position[k, [0, 2]]
@@ -182,14 +190,21 @@ class DodgeScene:
         hits = self.balls.step(self.root_position, np.stack([before, self._capsules]))
         for n, k, part, velocity in hits:
             number, at = self._number[n]
-            self._event(
-                "struck", k, attack=number, part=self.body.parts[part], meant=at == k,
-                speed=round(float(np.linalg.norm(velocity)), 3),
-                place=[round(float(x), 4) for x in self.balls.position[n]],
-            )  # fmt: skip
+            joint, where = int(self.body.joint[part]), self.balls.position[n]
+            self._tell(
+                Struck(
+                    self.frame,
+                    self.names[k],
+                    attack=number,
+                    ball=self.balls.objects[n].name,
+                    part=self.body.parts[part],
+                    meant=at == k,
+                    speed=float(np.linalg.norm(velocity)),
+                    place=place(where),
+                )
+            )
             self.dodgers.forget(number)
-            joint, place = int(self.body.joint[part]), self.balls.position[n]
-            self.cast.strike(k, joint, place, RECOIL * velocity)
+            self.cast.strike(k, joint, where, RECOIL * velocity)
             del self._number[n]
         for n in [n for n in self._number if self.balls.attack[n] is None]:
             self._over(n)
@@ -199,7 +214,9 @@ class DodgeScene:
         """A ball has come down without having met anybody: avoided, if it would have met whom it
         was thrown at or somebody has found a way out, else only missed."""
         number, at = self._number.pop(n)
-        self._event("avoided" if number in self._minded else "missed", at, attack=number)
+        how = Avoided if number in self._minded else Missed
+        ball = self.balls.objects[n].name
+        self._tell(how(self.frame, self.names[at], attack=number, ball=ball))
         self._minded.discard(number)
         self.dodgers.forget(number)
 
@@ -216,7 +233,7 @@ class DodgeScene:
     def _pose(self) -> np.ndarray:
         return capsules_of(self.body, self.cast.position, self.cast.world_wxyz)
 
-    def _event(self, kind: str, k: int, **data) -> None:
-        if kind == "avoidance" and data["outcome"] == Outcome.FOUND:
-            self._minded.add(data["attack"])
-        self.events.append(Event(self.frame, kind, self.names[k], data))
+    def _tell(self, event: Event) -> None:
+        if isinstance(event, Searched) and event.outcome == Outcome.FOUND:
+            self._minded.add(event.attack)
+        self.events.append(event)

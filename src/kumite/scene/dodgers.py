@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from kumite.clip import Skeleton
 from kumite.control.attack import Attack
 from kumite.control.avoidance import Avoidance, AvoidanceSearch, Outcome, Plan, Standing
 from kumite.rotation import planar_compose, wrap_angle
+from kumite.scene.events import Decision, Event, Searched, Stale
 from kumite.scene.settings_dodge import DodgeSettings
 from kumite.synthesis import Cast
 
@@ -55,6 +57,8 @@ class Menace:
 
     attack: Attack
     number: int
+    ball: str | None = None  # that is thrown, or …
+    attacker: str | None = None  # … whose blow it is
     told: set[str] = field(default_factory=set)  # outcomes that have been told
     tried: int = -1  # in which of its victim's edges avoiding it was last thought about
     covered: bool = False  # by the plan that is being followed
@@ -84,13 +88,15 @@ class Dodgers:
     def __init__(
         self,
         search: AvoidanceSearch,
+        names: Sequence[str],
         homes: np.ndarray,
         rng: np.random.Generator,
-        tell: Callable[..., None],
+        tell: Callable[[Event], None],
         *,
         latency: int = LATENCY,
     ) -> None:
-        """homes [K, 3]: facing frames. tell(kind, k, **data): the log."""
+        """names [K]; homes [K, 3]: facing frames. tell: is told of searches and decisions."""
+        self.names, self.frame = tuple(names), 0
         self.search, self.rng, self.tell, self.latency = search, rng, tell, latency
         self.library = library = search.library
         self.fps = library.clips.fps
@@ -114,14 +120,25 @@ class Dodgers:
         self.resolve: Callable[[int], Sequence[int]] = lambda k: ()  # stretches to play, if any
         self.cast.show(0.0)
 
-    def menace(self, k: int, attack: Attack, number: int) -> Menace:
-        """Let character k know of an attack on it; one of the same number is replaced."""
+    def menace(
+        self,
+        k: int,
+        attack: Attack,
+        number: int,
+        *,
+        ball: str | None = None,
+        attacker: str | None = None,
+    ) -> Menace:
+        """Let character k know of an attack on it; one of the same number is replaced.
+
+        ball: the thing that is thrown; attacker: whose blow it is.
+        """
         mind = self.minds[k]
         for known in mind.menaces:
             if known.number == number:
                 known.attack, known.covered, known.settled, known.tried = attack, False, False, -1
                 return known
-        mind.menaces.append(Menace(attack, number))
+        mind.menaces.append(Menace(attack, number, ball, attacker))
         return mind.menaces[-1]
 
     def forget(self, number: int) -> None:
@@ -131,7 +148,7 @@ class Dodgers:
 
     def step(self, frame: int) -> None:
         """One frame: searches are taken up and begun, edges chosen, all move on."""
-        now = frame / self.fps
+        self.frame, now = frame, frame / self.fps
         cast = self.cast
         for k, mind in enumerate(self.minds):
             if mind.search is not None and frame >= mind.due:
@@ -217,7 +234,7 @@ class Dodgers:
         """Take up what has been found against an attack."""
         if found.outcome not in menace.told or found.outcome == Outcome.FOUND:
             menace.told.add(found.outcome)
-            self.tell("avoidance", k, **_told(found, menace))
+            self.tell(self._searched(k, found, menace))
         # Wide of where it is may be right where it goes next; too late remains so.
         menace.settled = found.outcome == Outcome.LATE
         if found.outcome != Outcome.FOUND or found.plan is None:
@@ -235,7 +252,37 @@ class Dodgers:
             menace.covered = True
             return
         menace.tried = -1
-        self.tell("stale", k, attack=menace.number, dropped=1 + len(found.others))
+        self.tell(
+            Stale(
+                self.frame,
+                self.names[k],
+                attack=menace.number,
+                ball=menace.ball,
+                attacker=menace.attacker,
+                paths=1 + len(found.others),
+            )
+        )
+
+    def _searched(self, k: int, found: Avoidance, menace: Menace) -> Searched:
+        """What the log says of a search."""
+        names = ("valid", "hit", "culled", "stiff", "too_fast", "too_long")
+        said: dict[str, Any] = dict(zip(names, found.counts))
+        if found.counts:
+            said["candidates"] = found.candidates
+        if np.isfinite(found.aim):
+            said["aim"] = found.aim
+        if found.outcome == Outcome.FOUND:
+            best = ("path", "part", "indexed", "scale", "cost", "costs", "distance", "before")
+            said |= {name: getattr(found, name) for name in best}
+        return Searched(
+            self.frame,
+            self.names[k],
+            attack=menace.number,
+            ball=menace.ball,
+            attacker=menace.attacker,
+            outcome=found.outcome,
+            **said,
+        )
 
     # Going on ------------------------------------------------------------------------------------
 
@@ -244,7 +291,6 @@ class Dodgers:
 
         Whoever stands at a fork when an attack is first seen decides there and then.
         """
-        table = self.library.table
         planned = mind.plan is not None and mind.next_edge < len(mind.plan.path)
         if not planned and mind.search is None and self._seen(mind, now):
             asked = self._asked(k, mind, now)
@@ -264,10 +310,8 @@ class Dodgers:
         mind.edges += 1
         chosen = np.full(self.cast.count, stretch)
         self.cast.begin(np.array([k]), chosen)
-        self.tell(
-            "decision", k, stretch=int(stretch), jump=bool(self.cast.jump[k]),
-            frames=int(table.duration[stretch]),
-        )  # fmt: skip
+        jump = bool(self.cast.jump[k])
+        self.tell(Decision(self.frame, self.names[k], by="avoid", stretch=stretch, jump=jump))
 
     def _idle(self, k: int, mind: Mind) -> int:
         """A way to go on that avoids nothing, looks where it should and stays near home."""
@@ -300,26 +344,3 @@ def _after(path: Sequence[int], begun: Sequence[int]) -> tuple[int, ...] | None:
     if tuple(path[: len(begun)]) != tuple(begun) or len(path) < len(begun):
         return None
     return tuple(path[len(begun) :])
-
-
-def _told(found: Avoidance, menace: Menace) -> dict:
-    """What the log says of a search."""
-    out: dict = {"attack": menace.number, "outcome": found.outcome}
-    if np.isfinite(found.aim):
-        out["aim"] = round(found.aim, 4)
-    if found.counts:
-        names = ("valid", "hit", "culled", "stiff", "too_fast", "too_long")
-        out["candidates"] = found.candidates
-        out |= {name: n for name, n in zip(names, found.counts) if n}
-    if found.outcome == Outcome.FOUND:
-        out |= {
-            "path": list(found.path),
-            "part": found.part,
-            "indexed": found.indexed,
-            "scale": round(found.scale, 4),
-            "cost": round(found.cost, 5),
-            "costs": [round(c, 5) for c in found.costs],
-            "distance": round(found.distance, 4),
-            "before": round(found.before, 4),
-        }
-    return out

@@ -22,14 +22,15 @@ from kumite.control.counter import CounterSearch
 from kumite.errors import KumiteError
 from kumite.graph import Layer, Library
 from kumite.rotation import planar_apply, wrap_angle
+from kumite.scene import events
 from kumite.scene.apart import held_apart, push_two
 from kumite.scene.attackers import Attackers, Blow, middle_of, skill_of
 from kumite.scene.blows import Blows, Contact
 from kumite.scene.dodgers import Dodgers, volume_of
 from kumite.scene.doors import check_scene, layer_of
+from kumite.scene.events import Avoided, Counter, Event, Foreseen, Hit
 from kumite.scene.live import RECOIL
 from kumite.scene.memory import refuse_too_many
-from kumite.scene.recording import Event
 from kumite.scene.settings_dodge import DodgeSettings
 from kumite.scene.stage import SceneObject
 from kumite.synthesis import Cast
@@ -139,8 +140,10 @@ class EvasionScene:
         self.frame = 0
         self.events: list[Event] = []
         homes = np.array([[*d.position, np.radians(d.yaw_deg)] for d in self.settings.dodging])
-        rng = np.random.default_rng(self.seed)
-        self.dodgers = Dodgers(self.search, homes, rng, self._event, latency=self.dodge.latency)
+        rng, names = np.random.default_rng(self.seed), self.names[: self._dodgers_count]
+        self.dodgers = Dodgers(
+            self.search, names, homes, rng, self.events.append, latency=self.dodge.latency
+        )
         self.dodgers.distance, self.dodgers.resolve = self.dodge.distance, self._strike_back
         self.attackers = Attackers(self.skill, self.settings.attacker, self.seed)
         self.cast = Everyone([self.dodgers.cast, self.attackers.cast])
@@ -215,9 +218,15 @@ class EvasionScene:
         head = planar_apply(cast.anchor[at], self._heads[frames[at]])
         yaw = cast.anchor[at, 2] + clips.facing[frames[at], 2]
         root = planar_apply(cast.anchor[:, None], clips.root_position[frames])[..., [0, 2]]
-        stretch, worth = attackers.decide(a, np.column_stack([head, wrap_angle(yaw)]), root)
-        k = self._dodgers_count + a
-        self._event("decision", k, stretch=stretch, worth=round(worth, 6))
+        self.events.append(
+            attackers.decide(
+                a,
+                np.column_stack([head, wrap_angle(yaw)]),
+                root,
+                self.frame,
+                self.names[self._dodgers_count + a],
+            )
+        )
         for blow in attackers.foresee(a, self.frame):
             self._menace(blow, at)
         if self.dodge.searches:
@@ -244,17 +253,25 @@ class EvasionScene:
         cast, spheres = self.dodgers.cast, self.search.spheres
         body = spheres.at(cast.position[at], cast.world_wxyz[at])
         known.gap = blow.attack.nearest(body, spheres.radius)
-        self._event(
-            "foreseen", self._dodgers_count + blow.who, attack=known.number,
-            limb=LIMBS[blow.limb], blow=blow.blow, at=self.names[at], gap=round(known.gap, 4),
-            begins=round(float(blow.attack.when[0]), 4),
-        )  # fmt: skip
+        attacker = self.names[self._dodgers_count + blow.who]
+        self.events.append(
+            Foreseen(
+                self.frame,
+                attacker,
+                attack=known.number,
+                limb=LIMBS[blow.limb],
+                blow=blow.blow,
+                victim=self.names[at],
+                gap=known.gap,
+                begins=float(blow.attack.when[0]),
+            )
+        )
         if not self.dodge.searches:
             return
         for d in range(self._dodgers_count):
             off = blow.attack.centre[..., [0, 2]] - cast.root_position[d, [0, 2]]
             if d == at or np.hypot(off[..., 0], off[..., 1]).min() < NEAR:
-                self.dodgers.menace(d, blow.attack, known.number)
+                self.dodgers.menace(d, blow.attack, known.number, attacker=attacker)
 
     def _strike_back(self, d: int) -> Sequence[int]:
         """What a dodger who has just avoided a blow does about it: stretches, if anything."""
@@ -276,10 +293,17 @@ class EvasionScene:
             return ()
         self._bold[d] = -np.inf
         limb = LIMBS[int(self.library.strikes.limb[found.blow])]
-        self._event(
-            "counter", d, victim=self.names[self._dodgers_count + foe], limb=limb,
-            blow=found.blow, gap=round(found.gap, 4), seconds=round(found.seconds, 4),
-        )  # fmt: skip
+        self.events.append(
+            Counter(
+                self.frame,
+                self.names[d],
+                victim=self.names[self._dodgers_count + foe],
+                limb=limb,
+                blow=found.blow,
+                gap=found.gap,
+                seconds=found.seconds,
+            )
+        )
         return found.path
 
     # Bodies and blows ----------------------------------------------------------------------------
@@ -300,10 +324,11 @@ class EvasionScene:
         return side == 1 or self._counters is not None
 
     def _tell_strike(self, side: int, k: int, s: int, blow: int) -> None:
-        told = {}
-        if side == 1 and (k, s, blow) in self._coming:
-            told["attack"] = self._coming[k, s, blow].number
-        self._event("strike", side * self._dodgers_count + k, limb=LIMBS[s], blow=blow, **told)
+        coming = self._coming.get((k, s, blow)) if side == 1 else None
+        who = self.names[side * self._dodgers_count + k]
+        strikes = self._sides[side].cast.library.strikes
+        attack = None if coming is None else coming.number
+        self.events.append(events.strike(self.frame, who, s, blow, strikes, attack))
 
     def _land(self, side: int) -> None:
         """Blows of one side that have met somebody: say so, and let the struck segment give."""
@@ -319,18 +344,25 @@ class EvasionScene:
     def _hit(self, side: int, k: int, s: int, victim: int, met: Contact) -> None:
         mine, other = self._sides[side], self._sides[1 - side]
         part, blow = other.body.parts[met.part], int(mine.thrown[k, s])
-        told = {}
-        if side == 1 and (k, s, blow) in self._coming:
-            coming = self._coming[k, s, blow]
-            coming.landed, told["attack"] = True, coming.number
+        coming = self._coming.get((k, s, blow)) if side == 1 else None
+        if coming is not None:
+            coming.landed = True
         who, whom = (0, self._dodgers_count) if side == 0 else (self._dodgers_count, 0)
-        self._event(
-            "hit", who + k, victim=self.names[whom + victim], limb=LIMBS[s], part=part,
-            speed=round(float(np.linalg.norm(met.velocity)), 4),
-            place=[round(float(x), 4) for x in met.place],
-            time=round((self.frame - 1 + met.share) / self.fps, 4),
-            blocked=part in ARMS and not bool(mine.armed[s]), blow=blow, **told,
-        )  # fmt: skip
+        self.events.append(
+            Hit(
+                self.frame,
+                self.names[who + k],
+                victim=self.names[whom + victim],
+                limb=LIMBS[s],
+                part=part,
+                speed=float(np.linalg.norm(met.velocity)),
+                place=events.place(met.place),
+                time=(self.frame - 1 + met.share) / self.fps,
+                blocked=part in ARMS and not bool(mine.armed[s]),
+                blow=blow,
+                attack=None if coming is None else coming.number,
+            )
+        )
         joint = int(other.body.joint[met.part])
         other.cast.strike(victim, joint, met.place, RECOIL * met.velocity)
 
@@ -343,11 +375,16 @@ class EvasionScene:
             del self._coming[key]
             self.dodgers.forget(coming.number)
             if not coming.landed:
-                self._event("avoided", coming.at, attack=coming.number)
+                attacker = self.names[self._dodgers_count + coming.blow.who]
+                self.events.append(
+                    Avoided(
+                        self.frame,
+                        self.names[coming.at],
+                        attack=coming.number,
+                        attacker=attacker,
+                    )
+                )
                 self._bold[coming.at] = now + BOLDNESS
-
-    def _event(self, kind: str, k: int, **data) -> None:
-        self.events.append(Event(self.frame, kind, self.names[k], data))
 
 
 def _shared(skeletons: Sequence[Skeleton]) -> tuple[Skeleton, list[np.ndarray]]:

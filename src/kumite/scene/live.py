@@ -27,11 +27,12 @@ from kumite.kernels import crowd as kernels
 from kumite.kernels.blow import NO_BLOW, NOBODY, swept_contact
 from kumite.kernels.character import MANY
 from kumite.rotation import rotate
+from kumite.scene import events
 from kumite.scene.doors import a_place, check_scene
+from kumite.scene.events import Decision, Event, Hit
 from kumite.scene.floor import Floor, Landing
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.pairs import pair_up
-from kumite.scene.recording import Event
 from kumite.scene.settings import NEAREST, SceneSettings
 from kumite.scene.stage import SceneObject
 
@@ -280,7 +281,8 @@ class LiveScene:
         self.frame += 1
         if happened:
             for k, s, blow in floor.thrown:
-                self._event("strike", k, limb=LIMBS[s], blow=blow)
+                strikes = self.library.strikes
+                self.events.append(events.strike(self.frame, self.names[k], s, blow, strikes))
             for landing in floor.landings:
                 self._land(landing)
         if self.objects:
@@ -291,15 +293,18 @@ class LiveScene:
     def _note_decisions(self, who: np.ndarray, states: np.ndarray) -> None:
         choices, jump = self.fighters.choices, self.cast.jump
         for k, state in zip(who.tolist(), states.tolist()):
-            self._event(
-                "decision",
-                k,
-                state=state,
-                stretch=int(choices.stretch[k]),
-                worth=round(float(choices.worth[k]), 6),
-                considered=int(choices.considered[k]),
-                apart=int(choices.apart[k]),
-                jump=bool(jump[k]),
+            self.events.append(
+                Decision(
+                    self.frame,
+                    self.names[k],
+                    by="policy",
+                    state=state,
+                    stretch=int(choices.stretch[k]),
+                    worth=float(choices.worth[k]),
+                    considered=int(choices.considered[k]),
+                    apart=int(choices.apart[k]),
+                    jump=bool(jump[k]),
+                )
             )
 
     def _land(self, landing: Landing) -> None:
@@ -328,17 +333,19 @@ class LiveScene:
         place: np.ndarray,
         t: float,
     ) -> None:
-        self._event(
-            "hit",
-            k,
-            victim=victim,
-            limb=LIMBS[s],
-            part=part,
-            speed=round(float(np.linalg.norm(velocity)), 4),
-            place=[round(float(x), 4) for x in place],
-            time=round((self.frame - 1 + t) / self.fps, 4),
-            blocked=part in ARMS and part != victim,
-            blow=int(self.floor.blows.thrown[k, s]),
+        self.events.append(
+            Hit(
+                self.frame,
+                self.names[k],
+                victim=victim,
+                limb=LIMBS[s],
+                part=part,
+                speed=float(np.linalg.norm(velocity)),
+                place=events.place(place),
+                time=(self.frame - 1 + t) / self.fps,
+                blocked=part in ARMS and part != victim,
+                blow=int(self.floor.blows.thrown[k, s]),
+            )
         )
 
     def _test_objects(self) -> None:
@@ -368,6 +375,3 @@ class LiveScene:
             drag = 2.0 * SWING_DAMPING * SWING_RATE * self._swing[o]
             self._swing[o] += dt * (pull - drag)  # semi-implicit Euler: stays bounded
             thing.position = thing.position + dt * self._swing[o]
-
-    def _event(self, kind: str, k: int, **data) -> None:
-        self.events.append(Event(self.frame, kind, self.names[k], data))

@@ -11,7 +11,8 @@ from kumite.checks import instance
 from kumite.clip import SIDES, Skeleton, facing_frame, forward_kinematics
 from kumite.graph import Layer
 from kumite.rotation import wrap_angle
-from kumite.scene.recording import NO_FRAME, Event, Recording
+from kumite.scene.events import Decision, EventIndex, Hit, Strike
+from kumite.scene.recording import NO_FRAME, Recording
 from kumite.scene.reports import Report, reports
 
 FACING_WITHIN = np.radians(45.0)
@@ -98,10 +99,7 @@ def measure(recording: Recording) -> Metrics:
         pelvis.append(position[:, skeleton.joint("pelvis")][:, [0, 2]])
         facing.append(facing_frame(skeleton, root, wxyz))
     gaps = _closest(np.stack(pelvis, axis=1)) if count > 1 else []
-    events: dict[str, list[Event]] = {name: [] for name in recording.names}
-    for e in recording.events:
-        events[e.character].append(e)
-    rows = []
+    events, rows = EventIndex(recording.events), []
     for k, name in enumerate(recording.names):
         skate = foot_skate(skeleton, positions[k], recording.contacts[:, k], fps)
         target = aims.get(name)
@@ -122,14 +120,14 @@ def measure(recording: Recording) -> Metrics:
         speed = np.linalg.norm(np.diff(positions[k][:, 0], axis=0), axis=1) * fps
         inner = jump[(jump >= 2) & (jump < len(recording))]
         change = np.abs(speed[inner - 1] - speed[inner - 2])
-        mine = events[name]
-        taken = [e.data.get("stretch") for e in mine if e.kind == "decision"]
+        taken = [e.stretch for e in events.of(Decision, name)]
+        blocked = [e.blocked for e in events.of(Hit, name)]
         rows.append(
             CharacterMetrics(
                 name,
-                sum(e.kind == "strike" for e in mine),
-                sum(e.kind == "hit" and not e.data.get("blocked") for e in mine),
-                sum(e.kind == "hit" and bool(e.data.get("blocked")) for e in mine),
+                len(events.of(Strike, name)),
+                len(blocked) - sum(blocked),
+                sum(blocked),
                 skate,
                 skate / source if source else None,
                 share,

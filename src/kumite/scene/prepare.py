@@ -15,14 +15,15 @@ from kumite.control.preparation import PreparationSettings
 from kumite.errors import KumiteError, unknown
 from kumite.graph import Layer, Library
 from kumite.graph.preparing import Preparing
-from kumite.kernels.blow import swept_contact
+from kumite.kernels.blow import NO_BLOW, swept_contact
 from kumite.rotation import rotate
+from kumite.scene import events
 from kumite.scene.balls import capsules_of
 from kumite.scene.doors import check_scene
+from kumite.scene.events import Event, Hit, MovedGoal, Passed, Strike, Touched
 from kumite.scene.floor import TARGET_PARTS
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.opponents import NOBODY, Opponents, closing_in
-from kumite.scene.recording import Event
 from kumite.scene.settings_prepare import PrepareSettings
 from kumite.scene.stage import SceneObject
 from kumite.scene.things import STRIKE, Things
@@ -99,6 +100,7 @@ class PrepareScene:
                     "expected a place that is free"
                 )
         self.body = lay_body(self.skeleton)
+        self._blow = blows_of(library)
         self._tips = [self.skeleton.tip(limb) for limb in LIMBS]
         self._trunk = [i for i, part in enumerate(self.body.parts) if part in TARGET_PARTS[:4]]
         self.curve = self._curves()
@@ -136,8 +138,9 @@ class PrepareScene:
             homes += closing_in(foes, middle, self.rng).tolist()
         self.walkers = Walkers(
             self.guide,
+            self.names,
             np.array(homes),
-            self._event,
+            self.events.append,
             preparation=self.prepare.preparation,
             curve=self.curve,
         )
@@ -196,7 +199,9 @@ class PrepareScene:
             way = np.array([np.sin(yaw), np.cos(yaw)])
             along = (place - self.things.position[within, [0, 2]]) @ way
             place = place + ((0.6 if along >= 0 else -0.6) - along) * way
-            self._event("moved goal", k, thing=self.things.names[within])
+            self.events.append(
+                MovedGoal(self.frame, self.names[k], thing=self.things.names[within])
+            )
         self.told[k], self.thing[k] = place, NO_THING
         self._nearest[k], self._nearer_at[k] = np.inf, self.frame
         self.walkers.decide_anew(np.array([k]))
@@ -367,7 +372,14 @@ class PrepareScene:
         self._whom[k] = self.opponents.foe[k]
         limb = int(self.preparing.limb[t])
         if limb >= 0:
-            self._event("strike", k, limb=LIMBS[limb], blow=t)
+            self.events.append(self._thrown(k, t))
+
+    def _thrown(self, k: int, t: int) -> Strike:
+        """Character k throws the blow of target t."""
+        limb, blow, who = int(self.preparing.limb[t]), int(self._blow[t]), self.names[k]
+        if blow == NO_BLOW:
+            return Strike(self.frame, who, limb=LIMBS[limb])
+        return events.strike(self.frame, who, limb, blow, self.library.strikes)
 
     def _nearest_thing(self, k: int, t: int) -> int:
         """The thing that a motion launched by hand may meet."""
@@ -425,9 +437,8 @@ class PrepareScene:
     def _finish(self, k: int) -> None:
         n = int(self._at[k])
         if self._depth[k] > -np.inf and n != NO_THING:
-            self._event(
-                "passed", k, thing=self.things.names[n], clearance=-float(round(self._depth[k], 4))
-            )
+            thing, clearance = self.things.names[n], -float(self._depth[k])
+            self.events.append(Passed(self.frame, self.names[k], thing=thing, clearance=clearance))
         if n != NO_THING and self.thing[k] == n:  # some motions end as soon as they are past it
             self._next(k)
         self._at[k], self._whom[k] = NO_THING, NOBODY
@@ -443,7 +454,8 @@ class PrepareScene:
         capsules = capsules_of(self.body, shown.position[k : k + 1], shown.world_wxyz[k : k + 1])
         depth, part = self.things.depth(n, capsules[:, 0], self.body)
         if depth > 0 >= self._depth[k]:
-            self._event("touched", k, thing=self.things.names[n], part=self.body.parts[part])
+            thing, part = self.things.names[n], self.body.parts[part]
+            self.events.append(Touched(self.frame, self.names[k], thing=thing, part=part))
         self._depth[k] = max(self._depth[k], depth)
 
     def _tip_now(self, k: int, limb: int, pose: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
@@ -463,9 +475,8 @@ class PrepareScene:
             when = swept_contact(p0, p1, at, at, at, at, r, r, 0.03)
             if when >= 0:
                 self.things.kick(n, velocity)
-                self._hit(
-                    k, limb, self.things.names[n], self.things.names[n], velocity, p0, p1, when
-                )
+                thing = self.things.names[n]
+                self._hit(k, t, thing, thing, velocity, p0 + when * (p1 - p0), when)
         elif foe != NOBODY:
             body = self.body
             a, b = (
@@ -482,23 +493,48 @@ class PrepareScene:
                     best = (when, part)
             if best[0] <= 1.0:
                 when, part = best
-                self._hit(k, limb, self.names[foe], body.parts[part], velocity, p0, p1, when)
-                joint, place = int(self.body.joint[part]), p0 + when * (p1 - p0)
+                joint, place = int(body.joint[part]), p0 + when * (p1 - p0)
+                self._hit(k, t, self.names[foe], body.parts[part], velocity, place, when)
                 self.opponents.reel(foe, joint, place, velocity, self.frame)
 
-    def _hit(self, k, limb, victim, part, velocity, p0, p1, when) -> None:
+    def _hit(
+        self,
+        k: int,
+        t: int,
+        victim: str,
+        part: str,
+        velocity: np.ndarray,
+        place: np.ndarray,
+        share: float,
+    ) -> None:
+        """The blow of target t lands, within the last frame."""
         self._landed[k] = True
-        place = p0 + when * (p1 - p0)
-        self._event(
-            "hit",
-            k,
-            victim=victim,
-            limb=LIMBS[limb],
-            part=part,
-            speed=round(float(np.linalg.norm(velocity)), 4),
-            place=[round(float(x), 4) for x in place],
-            time=round((self.frame - 1 + when) / self.fps, 4),
+        thrown = self._thrown(k, t)
+        self.events.append(
+            Hit(
+                self.frame,
+                thrown.character,
+                victim=victim,
+                limb=thrown.limb,
+                part=part,
+                speed=float(np.linalg.norm(velocity)),
+                place=events.place(place),
+                time=(self.frame - 1 + share) / self.fps,
+                blocked=False,
+                blow=thrown.blow,
+            )
         )
 
-    def _event(self, kind: str, k: int, **data) -> None:
-        self.events.append(Event(self.frame, kind, self.names[int(k)], data))
+
+def blows_of(library: Layer) -> np.ndarray:
+    """The blow [T] of each target motion, a row of the library's strikes, or NO_BLOW: the one of
+    its limb that is nearest to its contact.
+    """
+    p, strikes = library.preparing, library.strikes
+    assert p is not None
+    out = np.full(len(p.limb), NO_BLOW)
+    for t, (limb, contact) in enumerate(zip(p.limb.tolist(), p.contact.tolist())):
+        off = np.where(strikes.limb == limb, np.abs(strikes.frame - contact), np.inf)
+        if len(off) and off.min() <= STRUCK_AROUND * library.clips.fps:
+            out[t] = int(np.argmin(off))
+    return out

@@ -13,7 +13,6 @@ Whoever reacts does so at the captured speed.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from kumite.clip import LIMBS, SIDES, forward_kinematics
 from kumite.control.game_tree import GameTree
 from kumite.errors import KumiteError
 from kumite.kernels.moves import FALL, NOTHING
+from kumite.scene import events
 from kumite.scene.floor import Floor, Landing
 from kumite.synthesis import (
     EFFECTIVE_MASS,
@@ -42,12 +42,29 @@ RECOIL = 0.018  # m that a struck segment gives way per m/s of the blow, without
 
 
 @dataclass(frozen=True)
-class Reaction:
+class Answer:
     """What a fighter does about a blow."""
 
     stretch: int  # of the action table
     begun: bool  # already by a moment of physics; otherwise it is to be begun now
-    told: dict[str, Any]  # for the log
+    action: str  # its label
+    size: str
+    physical: bool
+    impulse: float  # N s that the body takes up
+    deviation: float | None  # m, greatest, mean of all joints, by physics
+
+    def told(self, frame: int, who: str) -> events.Reaction:
+        """For the log."""
+        return events.Reaction(
+            frame,
+            who,
+            action=self.action,
+            stretch=self.stretch,
+            size=self.size,
+            physical=self.physical,
+            impulse=self.impulse,
+            deviation=self.deviation,
+        )
 
 
 @dataclass
@@ -121,7 +138,7 @@ class Reactions:
             self.floor.cast.held[k], self.late[k] = False, 0
         self.floor.cast.set_rate(k, 1.0)
 
-    def react(self, landing: Landing, blocked: bool, falls: bool = False) -> Reaction | None:
+    def react(self, landing: Landing, blocked: bool, falls: bool = False) -> Answer | None:
         """A blow has landed; a blocked one only moves the arm that it meets.
 
         falls: the victim is to fall, however light the blow.
@@ -143,21 +160,24 @@ class Reactions:
             return None
         impulse = blow_impulse(landing.velocity, limb)
         cast.set_rate(landing.victim, 1.0)
-        return Reaction(response, False, self._told(response, SIZES[size], impulse, None))
+        return self._answer(response, SIZES[size], impulse, None)
 
-    def _told(self, stretch: int, size: str, impulse: np.ndarray, pushed: Pushed | None) -> dict:
-        return {
-            "action": self.tree.labels[stretch],
-            "stretch": stretch,
-            "size": size,
-            "physical": pushed is not None and pushed.physical,
-            "impulse": round(float(np.linalg.norm(impulse)), 3),  # N s
-            "deviation": round(float(pushed.deviation.max()), 4) if pushed else None,  # m
-        }
+    def _answer(
+        self, stretch: int, size: str, impulse: np.ndarray, pushed: Pushed | None
+    ) -> Answer:
+        return Answer(
+            stretch,
+            pushed is not None,
+            self.tree.labels[stretch],
+            size,
+            pushed is not None and pushed.physical,
+            float(np.linalg.norm(impulse)),
+            float(pushed.deviation.max()) if pushed else None,
+        )
 
     # A moment of physics -------------------------------------------------------------------------
 
-    def _push(self, landing: Landing, joint: int, limb: str, falls: bool) -> Reaction:
+    def _push(self, landing: Landing, joint: int, limb: str, falls: bool) -> Answer:
         k, cast, rules = landing.victim, self.floor.cast, self.tree.rules
         assert self._ragdoll is not None  # start has made it
         mass = EFFECTIVE_MASS["foot" if limb.endswith("foot") else "hand"]
@@ -198,7 +218,7 @@ class Reactions:
         cast.frame[k] = self._counted(k, moment)
         cast.held[k], cast.stands[k] = True, planted
         size = SIZES[self._responses.size[entry]]
-        return Reaction(stretch, True, self._told(stretch, size, pushed.impulse, pushed))
+        return self._answer(stretch, size, pushed.impulse, pushed)
 
     def _now(self, k: int) -> Moment:
         """The pose shown, and how it came there."""

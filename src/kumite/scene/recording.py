@@ -5,10 +5,10 @@ The studio plays it, exporters write it, metrics measure it. The same seed gives
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, TypedDict
 
 import numpy as np
 
@@ -16,25 +16,35 @@ from kumite import checks, files
 from kumite.brief import brief, pictured
 from kumite.clip import Clip, Skeleton
 from kumite.errors import KumiteError, unknown
-from kumite.scene.told import check_event, check_settings, check_whole
+from kumite.scene.events import Event, read_events
 
 KIND, VERSION = files.RECORDING
 NO_FRAME = -1  # library_frame of a pose that is no captured frame
 
 
-@dataclass(frozen=True)
-class Event:
-    """Something that happened: at a frame, of a kind, to or by a character."""
+Size = Annotated[tuple[float, float, float], lambda v, what: checks.array(v, what, (3,), least=0.0)]
 
-    frame: int
-    kind: str  # decision, strike, hit, …
-    character: str  # who acts
-    data: Mapping[str, Any] = field(default_factory=dict)  # JSON values; SI units
 
-    def __post_init__(self) -> None:
-        checks.whole(self.frame, "event: frame", least=0)
-        checks.text(self.character, "event: character")
-        check_event(self.kind, self.data)
+def _with_bout(scene: Mapping[str, Any], what: str) -> Mapping[str, Any]:
+    bout = scene.get("bout")
+    return scene if bout is None else {**scene, "bout": checks.mapping(bout, f"{what}: bout")}
+
+
+class Made(TypedDict, total=False):
+    """What a recording may say of how it was made; other names hold any plain value."""
+
+    seed: int
+    library: str  # its digest
+    source_skate_m_s: float | None
+    object_radius: Mapping[str, Annotated[float, checks.above_zero]]  # m
+    object_size: Mapping[str, Size]  # m, of boxes
+    object_yaw: Mapping[str, float]  # rad
+    object_line: tuple[str, ...]
+    object_thrown: tuple[str, ...]
+    object_wheels: tuple[str, ...]
+    aims_at: Mapping[str, str | None]
+    unarmed: tuple[str, ...]
+    scene: Annotated[Mapping[str, Any], _with_bout]  # the scene's settings
 
 
 @brief
@@ -95,7 +105,15 @@ class Recording:
                 raise KumiteError(
                     f"recording: an event in frame {event.frame}; expected 0 to {frames}"
                 )
-        check_settings(self.settings)
+            for thing in event.things:
+                if thing not in self.objects:
+                    raise KumiteError(
+                        f"event {event.kind!r}: {checks.shown(thing)} is none of the objects"
+                    )
+        given = checks.mapping(self.settings, "recording: settings")
+        for name, check in checks.annotated(Made):
+            if name in given:
+                check(given[name], f"recording: {name}")
 
     def __len__(self) -> int:
         return len(self.root_position)
@@ -174,7 +192,7 @@ def save_recording(path: Path | str, recording: Recording) -> None:
         "skeleton": skeleton_header(recording.skeleton),
         "names": list(recording.names),
         "objects": list(recording.objects),
-        "events": [[e.frame, e.kind, e.character, dict(e.data)] for e in recording.events],
+        "events": [event.to_json() for event in recording.events],
         "settings": dict(recording.settings),
     }
     arrays = {
@@ -199,16 +217,9 @@ def load_recording(path: Path | str) -> Recording:
             skeleton=skeleton_from_header(header["skeleton"]),
             names=header["names"],
             objects=header["objects"],
-            events=_events(header["events"], tuple(header["objects"])),
+            events=read_events(header["events"]),
             settings=header["settings"],
             **arrays,
         )
     except files.UNREADABLE as error:
         raise KumiteError(f"{path}: damaged recording ({error})") from None
-
-
-def _events(rows: Sequence[Sequence[Any]], objects: tuple[str, ...]) -> tuple[Event, ...]:
-    events = tuple(Event(f, k, c, d) for f, k, c, d in rows)
-    for event in events:
-        check_whole(event.kind, event.data, objects)
-    return events

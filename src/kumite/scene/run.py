@@ -15,7 +15,7 @@ from kumite.scene.live import LiveScene
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.metrics import source_skate
 from kumite.scene.prepare import PrepareScene
-from kumite.scene.recording import NO_FRAME, Event, Recording
+from kumite.scene.recording import NO_FRAME, Recording
 
 MOST_BYTES = 16e9  # of one recording
 
@@ -77,7 +77,7 @@ def record(
         objects=tuple(thing.name for thing in scene.objects),
         object_position=things[:frames],
         rate=None if np.all(rate[:frames] == 1.0) else rate[:frames],
-        events=tuple(_counted_from(begin, e, scene.fps) for e in scene.events[seen:]),
+        events=tuple(e.counted_from(begin, scene.fps) for e in scene.events[seen:]),
         settings={
             "seed": scene.seed,
             "library": scene.library.digest,
@@ -93,11 +93,3 @@ def record(
             "scene": scene.settings.model_dump(mode="json"),
         },
     )
-
-
-def _counted_from(begin: int, event: Event, fps: float) -> Event:
-    """An event as it is told by a recording that begins at a frame of the scene."""
-    data = dict(event.data)
-    if begin and "time" in data:
-        data["time"] = round(data["time"] - begin / fps, 4)
-    return Event(event.frame - begin, event.kind, event.character, data)

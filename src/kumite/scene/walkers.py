@@ -23,6 +23,7 @@ from kumite.rotation import (
     planar_inverse,
     wrap_angle,
 )
+from kumite.scene.events import Decision, Done, Event, Launch
 from kumite.synthesis import Cast, LevelFilter, Moment, Preparation, References, references
 from kumite.synthesis.preparation import blended
 
@@ -56,19 +57,22 @@ class Walkers:
     def __init__(
         self,
         guide: Guide,
+        names: Sequence[str],
         homes: np.ndarray,
-        event: Callable[..., None],
+        tell: Callable[[Event], None],
         *,
         preparation: str = "ours",
         curve: np.ndarray | None = None,
     ) -> None:
-        """homes [K, 3]: facing frames to begin at. curve: C, [J] or [T, J] of each target. event is
-        told (kind, character, **data)."""
+        """names [K]; homes [K, 3]: facing frames to begin at. curve: C, [J] or [T, J] of each
+        target. tell: is told of decisions, and of motions begun and done.
+        """
         library = guide.library
         preparing = library.preparing
         if preparing is None:
             raise KumiteError("walkers: the library is not one for preparation")
-        self.guide, self.library, self.event = guide, library, event
+        self.guide, self.library, self.names, self.tell = guide, library, tuple(names), tell
+        self.frame = 0  # of the scene
         self.preparing, self.fps = preparing, library.clips.fps
         self.prepares = preparation != "none"
         count = len(homes)
@@ -231,14 +235,16 @@ class Walkers:
                 self._object[k] = place
                 # The turn of the capture that makes it face as it should.
                 self._way[k] = goal[2] - clips.facing[self.begins_at(which)[0], 2]
-        self.event(
-            "launch",
-            k,
-            motion=self._label(t),
-            level=round(float(self.alpha[k]), 4),
-            apart_deg=round(float(np.degrees(apart)), 3),
-            to_contact=round((int(p.contact[t]) - first) / self.fps, 4),
-            bent=off if np.isfinite(self._way[k]) else None,
+        self.tell(
+            Launch(
+                self.frame,
+                self.names[k],
+                motion=self._label(t),
+                level=float(self.alpha[k]),
+                apart_deg=float(np.degrees(apart)),
+                to_contact=(int(p.contact[t]) - first) / self.fps,
+                bent=off if np.isfinite(self._way[k]) else None,
+            )
         )
 
     def _best_beginning(self, k: int, t: int) -> tuple[int, float]:
@@ -288,6 +294,7 @@ class Walkers:
         self._meet(np.flatnonzero(busy & np.isfinite(self._object[:, 0])), shift)
         self._lead()
         self.shown.show_cast(cast, self.alpha, np.arange(cast.count), shift)
+        self.frame += 1
 
     def _levels(
         self,
@@ -378,6 +385,17 @@ class Walkers:
         state = np.where(leaves, self._leave_stand[core], state)
         self._stretch[who] = guide.onward[state, core]
         cast.begin(who, self._stretch)
+        for k in who[due].tolist():
+            self.tell(
+                Decision(
+                    self.frame,
+                    self.names[k],
+                    by="prepare",
+                    stretch=int(self._stretch[k]),
+                    jump=bool(cast.jump[k]),
+                    level=float(self.level[k]),
+                )
+            )
 
     def _core(self, who: np.ndarray) -> np.ndarray:
         """The cores that characters mean to play."""
@@ -417,7 +435,7 @@ class Walkers:
     def _return(self, who: np.ndarray, level: float) -> None:
         """Characters have done their target motions, and are prepared to a level for the next."""
         for k in who.tolist():
-            self.event("done", k, motion=self._label(int(self.doing[k])))
+            self.tell(Done(self.frame, self.names[k], motion=self._label(int(self.doing[k]))))
         self.doing[who], self.level[who] = ON_THE_WAY, level
         self._stretch[who] = NOTHING
         self.decide_anew(who)

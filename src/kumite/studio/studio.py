@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 
 from kumite.body import body_mesh
-from kumite.clip import LIMBS, forward_kinematics
+from kumite.clip import forward_kinematics
 from kumite.errors import KumiteError
 from kumite.scene.actions import ActionPlayback
 from kumite.scene.bout import BoutScene
 from kumite.scene.dodge import DodgeScene
+from kumite.scene.events import Hit, Struck
 from kumite.scene.prepare import PrepareScene
-from kumite.scene.recording import Event
 from kumite.scene.stage import Playback, Stage, in_sight
 from kumite.studio import bodies, props, ring
 from kumite.studio.coming import Coming
@@ -38,7 +38,7 @@ from kumite.studio.reference import Prepared, PreparedPicture
 from kumite.studio.server import close_server, is_loopback, open_server, url_of
 from kumite.studio.throwing import Throws
 from kumite.studio.volumes import VolumePicture, Volumes
-from kumite.studio.wording import LANDED, EventLog, is_dodging, is_preparing, place, struck
+from kumite.studio.wording import EventLog, is_dodging, is_preparing, struck
 
 MOST_DRAWN = 60.0  # pictures a second
 PANEL_PERIOD = 0.2  # s between updates of what is read, not watched
@@ -55,7 +55,7 @@ class _Picture:
     wxyz: np.ndarray  # [K, J, 4]
     objects: np.ndarray  # [O, 3] m
     radii: np.ndarray  # [O] m
-    hits: list[Event] = field(default_factory=list)
+    hits: list[Hit | Struck] = field(default_factory=list)
     note: str = ""  # behind the time
     paths: list[Path] = field(default_factory=list)  # of whom is sent along check points
     volumes: VolumePicture | None = None
@@ -102,7 +102,7 @@ class Studio:
         self._redraw = self._rewound = True
         self._playing = True
         self._ended = False
-        self._hits: list[Event] = []
+        self._hits: list[Hit | Struck] = []
         self._pace = Pace(stage.fps)
         self._log = EventLog(stage.names, dodging=is_dodging(stage), preparing=is_preparing(stage))
 
@@ -348,7 +348,7 @@ class Studio:
                 break
             self._rewound |= self.stage.frame < before  # what is played over and over
         fresh = self._log.update(self.stage.events, self.stage.frame)
-        self._hits += [e for e in fresh if e.kind in LANDED]
+        self._hits += [e for e in fresh if isinstance(e, Hit | Struck)]
         self._redraw = True
 
     def _tick(self) -> bool:
@@ -407,7 +407,7 @@ class Studio:
     def _draw(self, picture: _Picture, seconds: float) -> None:
         position, world = self._pose(self.stage.skeleton, picture.root_position, picture.wxyz)
         for hit in picture.hits:
-            self._show_hit(hit, position)
+            self._show_hit(hit)
         if not (self._targets.held or self._paths.held or self._sketch.who is not None):
             self._follow.update(self._midpoint(picture), seconds)
         self._bodies.draw(position, world, seconds)
@@ -441,21 +441,13 @@ class Studio:
         points = points if len(points) > 1 else self._in_view(picture)
         return points[:, [0, 2]].mean(axis=0)
 
-    def _show_hit(self, hit: Event, position: np.ndarray) -> None:
+    def _show_hit(self, hit: Hit | Struck) -> None:
         whom, names = struck(hit), self.stage.names
         if whom in names:
             self._bodies.flash(names.index(whom))
-        elif whom is not None:
+        else:
             self._targets.strike(whom)
-        point = place(hit)
-        if point is None and hit.character in names:
-            # No place given: where the limb is that struck.
-            limb = str(hit.data.get("limb", ""))
-            joint = self.stage.skeleton.roles.get(limb) if limb in LIMBS else None
-            point = None if joint is None else position[names.index(hit.character), joint].tolist()
-        if point is not None:
-            speed = hit.data.get("speed")
-            self._bursts.add(point, float(speed) if isinstance(speed, int | float) else 5.0)
+        self._bursts.add(hit.place, hit.speed)
 
 
 def serve(

@@ -5,210 +5,69 @@ from __future__ import annotations
 import html
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 from kumite.body import main_colours, mix
 from kumite.scene.dodge import DodgeScene
+from kumite.scene.events import (
+    Avoided,
+    Decision,
+    Done,
+    Event,
+    Hit,
+    Launch,
+    Missed,
+    MovedGoal,
+    Passed,
+    Reaction,
+    Searched,
+    Stale,
+    Strike,
+    Struck,
+    Throw,
+    Touched,
+)
 from kumite.scene.prepare import PrepareScene
-from kumite.scene.recording import Event
 from kumite.scene.stage import Playback, Stage
-from kumite.scene.walkers import OFF
+from kumite.scene.wording import describe
 
 LINES = 12  # events on the panel
 GREY = "#9aa0aa"  # of whoever has no colour
-LANDED = frozenset({"hit", "struck"})  # kinds that are seen where they land
-QUIET_KINDS = frozenset({"decision"})  # several a second: shown only when asked for
-MARKS = {
-    "strike": "○",
-    "hit": "●",
-    "dodge": "↷",
-    "reaction": "↯",
-    "decision": "·",
-    "throw": "○",
-    "avoidance": "◌",
-    "avoided": "↷",
-    "missed": "·",
-    "struck": "●",
-    "stale": "×",
-    "launch": "▸",
-    "done": "✓",
-    "passed": "↷",
-    "touched": "×",
-    "moved goal": "→",
+QUIET = (Decision,)  # several a second: shown only when asked for
+MARKS: dict[type[Event], str] = {
+    Strike: "○",
+    Hit: "●",
+    Reaction: "↯",
+    Decision: "·",
+    Throw: "○",
+    Searched: "◌",
+    Avoided: "↷",
+    Missed: "·",
+    Struck: "●",
+    Stale: "×",
+    Launch: "▸",
+    Done: "✓",
+    Passed: "↷",
+    Touched: "×",
+    MovedGoal: "→",
 }
-SAID = {
-    "found": "avoids it",
-    "wide": "lets it pass",
-    "early": "has time yet",
-    "hit": "no way out",
-    "no candidate": "no way out in time",
-    "too late": "sees it too late",
-}  # what a search came to
-CANDIDATES = ("hit", "culled", "stiff", "too_fast", "too_long")  # what became of those not taken
 
 
-def _words(value: Any) -> str:
-    return str(value).replace("_", " ")
-
-
-def _number(value: Any) -> str:
-    return f"{value:.2f}" if isinstance(value, float) else _words(value)
-
-
-def _first(data: Mapping[str, Any], *names: str) -> Any:
-    return next((data[n] for n in names if data.get(n) is not None), None)
-
-
-def struck(event: Event) -> str | None:
-    """The character or object that a hit landed on."""
-    if event.kind == "struck":
-        return event.character
-    whom = _first(event.data, "target", "victim", "on", "opponent", "object")
-    return None if whom is None else str(whom)
-
-
-def place(event: Event) -> list[float] | None:
-    """Where a hit landed [3] m, if the event says so."""
-    point = _first(event.data, "place", "position", "point", "at")
-    if not isinstance(point, Sequence) or isinstance(point, str) or len(point) != 3:
-        return None
-    return [float(x) for x in point]
-
-
-def describe(event: Event) -> str:
-    """What was done, without who and when: ``left hand → Blue's head, 6.2 m/s``."""
-    data = event.data
-    limb, part = _first(data, "limb"), _first(data, "part", "struck")
-    speed, whom = _first(data, "speed"), struck(event)
-    if event.kind in ("strike", "hit"):
-        said = _words(limb) if limb is not None else event.kind
-        if whom is not None and part is not None and str(part) != whom:
-            said += f" → {whom}'s {_words(part)}"
-        elif whom is not None or part is not None:
-            said += f" → {_words(part if whom is None else whom)}"
-        if isinstance(speed, int | float):
-            said += f", {speed:.1f} m/s"
-        if data.get("blocked"):
-            said += ", blocked"
-        return said
-    if event.kind in TOLD:
-        return TOLD[event.kind](data)
-    rest = [
-        _number(v) if k in ("action", "label", "name", "kind") else f"{_words(k)} {_number(v)}"
-        for k, v in data.items()
-        if isinstance(v, str | int | float) and not isinstance(v, bool)
-    ]
-    return ", ".join(rest[:4])
-
-
-def _thrown(data: Mapping[str, Any]) -> str:
-    said = f"ball {data.get('attack', '')} is thrown"
-    return said + (f", {data['speed']:.1f} m/s" if "speed" in data else "")
-
-
-def _avoided(data: Mapping[str, Any]) -> str:
-    return f"ball {data.get('attack', '')} is avoided"
-
-
-def _missed(data: Mapping[str, Any]) -> str:
-    return f"ball {data.get('attack', '')} comes near nobody"
-
-
-def _struck(data: Mapping[str, Any]) -> str:
-    said = f"ball {data.get('attack', '')} → {_words(data.get('part', 'body'))}"
-    said += f", {data['speed']:.1f} m/s" if "speed" in data else ""
-    return said + (", meant for another" if data.get("meant") is False else "")
-
-
-def _stale(data: Mapping[str, Any]) -> str:
-    count = data.get("dropped", 0)
-    return f"ball {data.get('attack', '')}: {count} {'path' if count == 1 else 'paths'} too late"
-
-
-def _searched(data: Mapping[str, Any]) -> str:
-    """What a search came to: how many candidates, at what cost, how far away."""
-    outcome, count = data.get("outcome"), data.get("candidates")
-    said = f"ball {data.get('attack', '')}: {SAID.get(str(outcome), _words(outcome))}"
-    if "aim" in data:
-        said += f", in {data['aim']:.2f} s"
-    if outcome != "found":
-        became = [f"{data[n]} {_words(n)}" for n in CANDIDATES if data.get(n)]
-        return said + (f"; of {count} candidates {', '.join(became)}" if became else "")
-    where = "from the index" if data.get("indexed") else "searched"
-    said += f"; {data.get('valid', 0)} of {count} candidates, {where}"
-    if len(data.get("costs", ())) == 3:
-        parts = zip(("avoidance", "body", "timescale"), data["costs"])
-        said += f"; cost {data.get('cost', 0.0):.2f}: "
-        said += ", ".join(f"{name} {cost:.2f}" for name, cost in parts)
-    return said + (f"; {100 * data['distance']:.0f} cm away" if "distance" in data else "")
-
-
-DODGING = {
-    "throw": _thrown,
-    "avoidance": _searched,
-    "avoided": _avoided,
-    "missed": _missed,
-    "struck": _struck,
-    "stale": _stale,
-}
-"""How what happens to those at whom balls are thrown is said."""
-
-
-def _launched(data: Mapping[str, Any]) -> str:
-    """How well prepared a motion was begun, how soon it meets something, and how far it is bent."""
-    said = _words(data.get("motion", "motion"))
-    if "level" in data:
-        said += f", prepared to {data['level']:.2f}"
-    if "apart_deg" in data:
-        said += f", {data['apart_deg']:.1f}° from its posture"
-    if "to_contact" in data:
-        said += f"; contact in {data['to_contact']:.2f} s"
-    if (off := data.get("bent")) is not None:
-        said += f", bent by {100 * off:.0f} cm" if off <= OFF else f", {off:.1f} m off: not bent"
-    return said
-
-
-def _done(data: Mapping[str, Any]) -> str:
-    return f"{_words(data.get('motion', 'motion'))} is done"
-
-
-def _passed(data: Mapping[str, Any]) -> str:
-    clearance = 100 * float(data.get("clearance", 0.0))
-    how = f"{clearance:.0f} cm clear" if clearance >= 0 else f"{-clearance:.0f} cm too near"
-    return f"{_words(data.get('thing', 'obstacle'))} is passed, {how}"
-
-
-def _touched(data: Mapping[str, Any]) -> str:
-    return f"{_words(data.get('part', 'body'))} touches {_words(data.get('thing', 'obstacle'))}"
-
-
-def _moved(data: Mapping[str, Any]) -> str:
-    return f"cannot stand in {_words(data.get('thing', 'an obstacle'))}: goes beside it"
-
-
-PREPARING = {
-    "launch": _launched,
-    "done": _done,
-    "passed": _passed,
-    "touched": _touched,
-    "moved goal": _moved,
-}
-"""How what happens to those who prepare is said."""
-
-TOLD = {**DODGING, **PREPARING}
+def struck(event: Hit | Struck) -> str:
+    """The character or thing that a blow or a ball lands on."""
+    return event.character if isinstance(event, Struck) else event.victim
 
 
 def is_preparing(stage: Stage) -> bool:
     """Whether those on a stage prepare for what they do: in a recording, whether one did."""
     if isinstance(stage, Playback):
-        return any(e.kind == "launch" for e in stage.recording.events)
+        return any(isinstance(e, Launch) for e in stage.recording.events)
     return isinstance(stage, PrepareScene)
 
 
 def is_dodging(stage: Stage) -> bool:
     """Whether balls are thrown at those on a stage: in a recording, whether one was."""
     if isinstance(stage, Playback):
-        return any(e.kind == "throw" for e in stage.recording.events)
+        return any(isinstance(e, Throw) for e in stage.recording.events)
     return isinstance(stage, DodgeScene)
 
 
@@ -254,20 +113,28 @@ class EventLog:
     def _take(self, fresh: Iterable[Event]) -> None:
         for event in fresh:
             self._all.append(event)
-            if event.kind not in QUIET_KINDS:
+            if not isinstance(event, QUIET):
                 self._loud.append(event)
-            if event.character not in self.thrown:
-                continue
-            if event.kind in ("strike", "throw"):
-                self.thrown[event.character] += 1
-            elif event.kind == "hit" and not event.data.get("blocked"):
-                self.landed[event.character] += 1
-            elif event.kind in ("avoided", "struck"):
-                counts = self.avoided if event.kind == "avoided" else self.struck
-                counts[event.character] += 1
-            elif event.kind in ("done", "touched"):
-                counts = self.done if event.kind == "done" else self.touched
-                counts[event.character] += 1
+            if event.character in self.thrown:
+                self._count(event)
+
+    def _count(self, event: Event) -> None:
+        match event:
+            case Strike() | Throw():
+                counts = self.thrown
+            case Hit(blocked=False):
+                counts = self.landed
+            case Avoided():
+                counts = self.avoided
+            case Struck():
+                counts = self.struck
+            case Done():
+                counts = self.done
+            case Touched():
+                counts = self.touched
+            case _:
+                return
+        counts[event.character] += 1
 
     @property
     def lines(self) -> list[Event]:
@@ -310,17 +177,15 @@ def _score_row(name: str, colour: str, counts: Sequence[int]) -> str:
 
 
 def _line_html(event: Event, fps: float, colours: Mapping[str, str], faded: float) -> str:
-    said = describe(event)
-    if event.kind not in ("strike", "hit", *TOLD):
-        said = f"{_words(event.kind)}: {said}" if said else _words(event.kind)
-    weight = 600 if event.kind in LANDED and not event.data.get("blocked") else 400
+    landed = isinstance(event, Struck) or (isinstance(event, Hit) and not event.blocked)
+    weight = 600 if landed else 400
     cell = "white-space:nowrap;vertical-align:top;padding-right:.5em"
     return (
         f'<tr style="opacity:{1 - faded:.2f}">'
         f'<td style="opacity:.6;{cell}">{event.frame / fps:.1f}</td>'
         f'<td style="color:{colours.get(event.character, GREY)};{cell}">'
-        f"{MARKS.get(event.kind, '▪')} {html.escape(event.character)}</td>"
-        f'<td style="font-weight:{weight}">{html.escape(said)}</td></tr>'
+        f"{MARKS.get(type(event), '▪')} {html.escape(event.character)}</td>"
+        f'<td style="font-weight:{weight}">{html.escape(describe(event))}</td></tr>'
     )
 
 
