@@ -48,6 +48,7 @@ def built_whole(whole: Layer, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def kumite(run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     """Run a command line in a folder of its own, with a cache of its own."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.delenv("KUMITE_CACHE", raising=False)
     return run
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import os
+from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -97,3 +100,37 @@ def test_what_a_file_holds_is_told_without_reading_it_all(tmp_path):
         assert files.kind_of(tmp_path / f"{k}") is None
     assert files.kind_of(tmp_path) is None and files.kind_of(tmp_path / "none") is None
     assert files.kind_of("") is None and files.kind_of("x" * 5000) is None
+
+
+WRITERS = {"write_text", "write_bytes", "savefig", "save", "tofile", "dump", "savez", "writestr"}
+WHOLE = {"files.save", "learning.save"}
+ELSEWHERE = {
+    "kernels/kept.py",  # imports nothing of ours; it renames, too, and what is lost is made anew
+    "export/notebook.py",  # into memory
+}
+
+
+def _writes(tree: ast.AST, inside: bool = False) -> Iterator[tuple[int, bool]]:
+    """Lines on which something is written, and whether that is within ``files.writing``."""
+    if isinstance(tree, ast.With):
+        calls = [i.context_expr for i in tree.items if isinstance(i.context_expr, ast.Call)]
+        inside = inside or any(ast.unparse(c.func).endswith("writing") for c in calls)
+    if isinstance(tree, ast.Call) and ast.unparse(tree.func) not in WHOLE:
+        name = ast.unparse(tree.func).rpartition(".")[2]
+        given = [*tree.args, *(k.value for k in tree.keywords)]
+        modes = {str(a.value) for a in given if isinstance(a, ast.Constant)}
+        if name in WRITERS or (name == "open" and modes & {"w", "wb", "a", "ab", "x", "xb"}):
+            yield tree.lineno, inside
+    for child in ast.iter_child_nodes(tree):
+        yield from _writes(child, inside)
+
+
+def test_whatever_writes_a_file_writes_it_whole():
+    root = Path(files.__file__).parent
+    found = 0
+    for path in sorted(root.rglob("*.py")):
+        for line, whole in _writes(ast.parse(path.read_text("utf-8"))):
+            found += 1
+            name = path.relative_to(root).as_posix()
+            assert whole or name in ELSEWHERE, f"{name}:{line} writes without files.writing"
+    assert found > 9  # it finds writes at all

@@ -211,3 +211,30 @@ cli.main()
     )
     assert (done.returncode, done.stdout) == (130, "")
     assert done.stderr.strip().splitlines()[-1] == "interrupted" and "Trace" not in done.stderr
+
+
+PLAYED = """
+import contextlib, sys
+from kumite import cli
+from kumite.scene import Playback, load_recording
+rec = sys.argv[1]
+stage = Playback(load_recording(rec))
+for _ in range(20):
+    stage.step()
+stage.reset(1)
+for outs in (["x.glb"], ["x.bvh", "--character", "red"]):
+    sys.argv = ["kumite", "export", rec, "-o", *outs]
+    with contextlib.suppress(SystemExit):
+        cli.main()
+from kumite.kernels.within import KERNELS
+print(len(KERNELS) > 9, sorted(name for name, kernel in KERNELS.items() if kernel.overloads))
+"""
+
+
+def test_what_is_recorded_is_played_and_exported_without_a_kernel(tmp_path: Path):
+    recording = Path(kumite.__file__).parent / "studio" / "sparring.rec"
+    command = [sys.executable, "-c", PLAYED, str(recording)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == "True []"
+    assert (tmp_path / "x.glb").stat().st_size > 10_000

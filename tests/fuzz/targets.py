@@ -65,7 +65,7 @@ from kumite.scene.recording import Recording
 from kumite.scene.reports import reports
 from kumite.scene.wording import describe
 from kumite.studio.wording import EventLog, lines_html, score_html, struck
-from tests.fuzz import mutate
+from tests.fuzz import commands, mutate
 from tests.telling import THINGS, one_of_each
 from tests.test_asfamc import AMC, ASF
 
@@ -189,6 +189,14 @@ def forged_library(rng: Rng, folder: Path) -> None:
         _run(library.layer(level), level)
 
 
+def library_commands(rng: Rng, folder: Path) -> None:
+    level = str(rng.choice(["frames", "actions", "preparation"]))
+    good = _saved(folder, f"{level}.kumite", lambda p: save_library(p, libraries()[level]))
+    path = folder / "forged.kumite"
+    _forge(rng, path, good, *files.LIBRARY)
+    commands.on_library(rng, folder, path, level)
+
+
 def _run(library: Layer, level: str) -> None:
     """Have the characters of a scene made for it do something."""
     from kumite.scene import BoutScene, PrepareScene
@@ -232,6 +240,13 @@ def forged_recording(rng: Rng, folder: Path) -> None:
         recording_sheet(folder / "x.png", made, [0, len(made) - 1], size=(64, 48))
 
 
+def recording_commands(rng: Rng, folder: Path) -> None:
+    good = _saved(folder, "fight.rec", lambda p: save_recording(p, fight()))
+    path = folder / "forged.rec"
+    _forge(rng, path, good, *files.RECORDING)
+    commands.on_recording(rng, folder, path)
+
+
 def forged_policy(rng: Rng, folder: Path) -> None:
     """A damaged policy is solved again, never believed."""
     library = libraries()["frames"]
@@ -244,6 +259,18 @@ def forged_policy(rng: Rng, folder: Path) -> None:
     found = trained(library, behaviour, folder)
     assert found.value.shape == known.value.shape and np.isfinite(found.value).all()
     assert isinstance(found.converged, bool) and isinstance(found.sweeps, int)
+
+
+def policy_commands(rng: Rng, folder: Path) -> None:
+    library = libraries()["frames"]
+    path = _saved(folder, "frames.kumite", lambda p: save_library(p, library))
+    good, beside = folder / "good", Path(f"{path}.cache")
+    beside.mkdir(exist_ok=True)
+    behaviour = BEHAVIOURS[str(rng.choice(["approach", "strike"]))](library)
+    trained(library, behaviour, good)
+    (name,) = (p.name for p in good.glob(f"{behaviour.name}-*.policy"))
+    _forge(rng, beside / name, good / name, "policy", 1)
+    commands.on_policy(rng, path)
 
 
 @functools.cache
@@ -262,6 +289,13 @@ def forged_performance(rng: Rng, folder: Path) -> None:
         raise KumiteError(str(error)[:100]) from None
     for truth in made.truth:
         json.dumps(performer.truth_to_json(truth), allow_nan=False)
+
+
+def performance_commands(rng: Rng, folder: Path) -> None:
+    good = _saved(folder, "performance.kumite", lambda p: kept._save(p, _performance()))
+    path = folder / "forged-performance.kumite"
+    _forge(rng, path, good, kept.KIND, kept.VERSION)
+    commands.on_performance(rng, folder, path)
 
 
 # Texts -----------------------------------------------------------------------------------------
@@ -402,6 +436,10 @@ TARGETS: dict[str, Case] = {
     "recording": forged_recording,
     "policy": forged_policy,
     "performance": forged_performance,
+    "library-commands": library_commands,
+    "recording-commands": recording_commands,
+    "policy-commands": policy_commands,
+    "performance-commands": performance_commands,
     "bvh": _text_case(_bvh_sources, ".bvh", _read_bvh),
     "mocap": _text_case(lambda f: _bvh_sources(f)[-1:], ".bvh", _load_bvh),
     "asf": _text_case(lambda _: [ASF.encode()], ".asf", read_asf),

@@ -56,6 +56,7 @@ from kumite.annotate.action_lines import (
 from kumite.annotate.actions import Actions
 from kumite.annotate.avoidance import AvoidanceParts
 from kumite.annotate.vocabulary import DIRECTIONS, DIRECTIONS_OF, KINDS, NO_LIMB
+from kumite.checked import checked
 from kumite.clip import LIMBS, ClipSet, runs
 from kumite.errors import at, unknown
 
@@ -147,6 +148,7 @@ def _check_parts(path: Path | str, section: Section, frames: int) -> None:
         before = (a, b, line.number)
 
 
+@checked
 def read_actions(path: Path | str, clips: ClipSet) -> Actions:
     """The actions that a file gives clips, in order; a person's lines have what two lines claim.
 
@@ -156,6 +158,7 @@ def read_actions(path: Path | str, clips: ClipSet) -> Actions:
     return to_actions(_lines_of(path, clips), clips)
 
 
+@checked
 def read_avoidance(path: Path | str, clips: ClipSet) -> AvoidanceParts:
     """The avoidance parts that a file of actions gives clips. Errors: as :func:`read_actions`."""
     return to_parts(_lines_of(path, clips), clips)
@@ -169,6 +172,7 @@ class Marked:
     cycles: tuple[tuple[str, int, int], ...]  # label, start, stop (its last frame)
 
 
+@checked
 def read_marked(path: Path | str, clips: ClipSet) -> Marked:
     """The target motions and cycles that a file marks, each label once: a second one is numbered.
 
@@ -380,6 +384,7 @@ def _free_pieces(line: Line, taken: np.ndarray, *, claim: bool = False) -> list[
     ]
 
 
+@checked
 def write_actions(
     path: Path | str, actions: Actions, clips: ClipSet, avoidance: AvoidanceParts | None = None
 ) -> None:

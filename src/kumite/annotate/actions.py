@@ -18,6 +18,7 @@ from kumite.annotate.segments import Cut, CutSettings, find_cuts, find_motion
 from kumite.annotate.strikes import Strikes
 from kumite.annotate.vocabulary import DIRECTIONS, DIRECTIONS_OF, KINDS, NO_LIMB
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.checks import freeze, names, rising
 from kumite.clip import LIMBS, ClipSet
 from kumite.errors import KumiteError
@@ -81,6 +82,7 @@ class Actions:
         return np.searchsorted(self.clip_start, self.start, side="right") - 1
 
 
+@checked
 def shorter_rests(actions: Actions, longest: float) -> Actions:
     """The same actions, but whoever rests longer than 1.5 times so many frames may go on between.
 
@@ -119,6 +121,7 @@ class _Part:
     label: str
 
 
+@checked
 def find_actions(
     clips: ClipSet,
     contacts: Contacts,

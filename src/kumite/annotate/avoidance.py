@@ -33,6 +33,7 @@ from kumite.annotate.contacts import Contacts
 from kumite.annotate.strikes import find_strikes
 from kumite.annotate.vocabulary import KINDS
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.checks import freeze, rising
 from kumite.clip import SIDES, ClipSet, runs
 from kumite.errors import KumiteError
@@ -156,6 +157,7 @@ class _Body:
     reaction: np.ndarray  # [F] bool
 
 
+@checked
 def find_avoidance(
     clips: ClipSet,
     contacts: Contacts,

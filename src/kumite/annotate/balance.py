@@ -17,6 +17,7 @@ from kumite.body import Body, lay_body
 from kumite.body.segments import foot_line
 from kumite.body.stance import stand
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.checks import freeze
 from kumite.clip import SIDES, ClipSet, Skeleton
 from kumite.errors import KumiteError
@@ -27,6 +28,7 @@ RAISED = 0.03  # m above a foot's lowest corner: what is higher does not touch t
 CORNERS = 6  # of a foot: heel, ball and toes, left and right of each
 
 
+@checked
 @brief
 @dataclass(frozen=True)
 class Balance:
@@ -54,6 +56,7 @@ class Balance:
         return self.distance <= 0.0
 
 
+@checked
 def find_balance(clips: ClipSet, contacts: Contacts, body: Body | None = None) -> Balance:
     """Centre of mass, support area and the distance between them of every frame.
 
@@ -80,6 +83,7 @@ def support(
     return np.ascontiguousarray(at[..., [0, 2]]), touches
 
 
+@checked
 def centre_of_mass(body: Body, position: np.ndarray, world_wxyz: np.ndarray) -> np.ndarray:
     """Centres of mass [..., 3] of poses of joints at [..., J, 3] turned by [..., J, 4]."""
     turned = rotation.rotate(world_wxyz[..., body.joint, :], centroids(body))

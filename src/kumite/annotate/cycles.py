@@ -19,6 +19,7 @@ from kumite.annotate.actions import Actions
 from kumite.annotate.contacts import Contacts, velocity
 from kumite.annotate.vocabulary import KINDS
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.checks import fps, freeze, names
 from kumite.clip import SIDES, ClipSet, forward_kinematics, runs
 from kumite.errors import KumiteError, unknown
@@ -114,6 +115,7 @@ class Cycles:
         )
 
 
+@checked
 def find_cycles(
     clips: ClipSet,
     contacts: Contacts,
@@ -162,6 +164,7 @@ def find_cycles(
     return cycles.take(sorted(kept, key=lambda i: (cycles.label[i], order.index(i))))
 
 
+@checked
 def hand_cycles(
     clips: ClipSet,
     contacts: Contacts,
@@ -189,6 +192,7 @@ def hand_cycles(
     return _measured(look, [label for label, _, _ in labelled], out)
 
 
+@checked
 def labelled_frames(actions: Actions, kinds: Sequence[str] = ("transition", "idle")) -> np.ndarray:
     """Frames [F] bool of actions of these kinds: where :func:`find_cycles` is to look."""
     for kind in kinds:

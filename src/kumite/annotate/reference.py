@@ -20,6 +20,7 @@ from kumite.annotate.balance import Balance, find_balance
 from kumite.annotate.contacts import Contacts
 from kumite.annotate.strikes import Strikes
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.checks import freeze
 from kumite.clip import LEG_ROLES, SIDES, ClipSet
 from kumite.errors import KumiteError
@@ -29,6 +30,7 @@ LEGS = 4.0  # rad²: six joints of both legs that differ by 47° each: who ducks
 DEPARTED = 0.25  # of the farthest that a target goes from its start: there it has begun
 
 
+@checked
 @brief
 @dataclass(frozen=True)
 class Reference:
@@ -63,6 +65,7 @@ def where_found(frame: int, mark: int, found: bool) -> str:
     return f"frame {frame}, the start: no frame up to the mark fits"
 
 
+@checked
 def find_reference(
     clips: ClipSet,
     contacts: Contacts,
@@ -113,6 +116,7 @@ def leg_differences(clips: ClipSet, start: int, span: slice) -> np.ndarray:
     return np.sum(angle(clips.wxyz[span][:, joints], clips.wxyz[start, joints]) ** 2, axis=1)
 
 
+@checked
 def find_mark(
     clips: ClipSet,
     start: int,

@@ -15,6 +15,7 @@ import numpy as np
 
 from kumite.annotate.contacts import velocity
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.checks import freeze, instance
 from kumite.clip import LIMBS, ClipSet, runs, tip_positions
 from kumite.errors import KumiteError
@@ -70,6 +71,7 @@ class Strikes:
         return self.tip[self.effective]
 
 
+@checked
 def only_blows(strikes: Strikes, keep: np.ndarray) -> Strikes:
     """The strikes without the blows that are not kept [X] bool: arms swing in running, too."""
     effective = np.zeros_like(strikes.effective)

@@ -8,6 +8,7 @@ import numpy as np
 
 from kumite.body.segments import Body
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.errors import KumiteError
 from kumite.kernels import overlap as kernels
 from kumite.rotation import rotate
@@ -36,6 +37,7 @@ def posed(body: Body, position: np.ndarray, world_wxyz: np.ndarray) -> tuple[np.
     return start, end, body.radius_start, body.radius_end
 
 
+@checked
 def keep_out(
     body: Body,
     position: np.ndarray,

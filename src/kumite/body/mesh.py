@@ -12,6 +12,7 @@ from kumite.body.boxer import make_surfaces
 from kumite.body.stance import Stance, stand
 from kumite.body.sweep import vertex_normals
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.clip import Skeleton
 from kumite.errors import KumiteError
 
@@ -19,6 +20,7 @@ ROLES = ("skin", "hair", "shirt", "shorts", "gloves", "shoes", "soles", "trim")
 """What a vertex is of; a palette gives each a colour. Vertices and faces are grouped by role."""
 
 
+@checked
 @brief
 @dataclass(frozen=True)
 class BodyMesh:
@@ -56,6 +58,7 @@ class BodyMesh:
         return (np.array([palette[r] for r in ROLES], dtype=np.float32) / 255.0)[self.role]
 
 
+@checked
 def skin_vertices(
     mesh: BodyMesh, skeleton: Skeleton, position: np.ndarray, world_wxyz: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -73,6 +76,7 @@ def skin_vertices(
     return vertices, normals / np.maximum(length, 1e-12)
 
 
+@checked
 def body_mesh(skeleton: Skeleton, *, armed: bool = True) -> BodyMesh:
     """The skin of a boxer on any skeleton with the required roles; sizes follow from its bones.
 

@@ -7,6 +7,8 @@ import re
 from collections.abc import Mapping, Sequence
 from zlib import crc32
 
+from kumite.checked import checked
+
 RGB = tuple[int, int, int]  # sRGB, 0..255
 Palette = Mapping[str, RGB]  # role -> colour
 
@@ -37,12 +39,14 @@ _LIGHT: RGB = (232, 232, 228)
 _STEPS = (0.61803398875, 0.7548776662, 0.5698402910)  # of hue, saturation, value: none come back
 
 
+@checked
 def mix(a: RGB, b: RGB, t: float) -> RGB:
     """From ``a`` at t = 0 to ``b`` at t = 1."""
     r, g, b_ = (round(x + (y - x) * t) for x, y in zip(a, b))
     return r, g, b_
 
 
+@checked
 def main_colours(names: Sequence[str]) -> list[RGB]:
     """The colour that each character is known by.
 
@@ -66,6 +70,7 @@ def main_colours(names: Sequence[str]) -> list[RGB]:
     return [colour for colour in out if colour is not None]
 
 
+@checked
 def palettes(names: Sequence[str]) -> list[Palette]:
     """A colour for every role of ``ROLES``, for each character."""
     return [_outfit(name, main) for name, main in zip(names, main_colours(names))]

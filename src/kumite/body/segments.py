@@ -17,6 +17,7 @@ from kumite.body.stance import (
     stand,
 )
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.clip import SIDES, Skeleton
 from kumite.errors import KumiteError, unknown
 
@@ -67,6 +68,7 @@ RADIUS = {
 }
 
 
+@checked
 @brief
 @dataclass(frozen=True)
 class Body:
@@ -109,6 +111,7 @@ class Body:
         return self.parts.index(name)
 
 
+@checked
 def lay_body(skeleton: Skeleton, *, total_mass: float = TOTAL_MASS) -> Body:
     """Lay a body on any skeleton with the required roles; sizes follow from its bones.
 

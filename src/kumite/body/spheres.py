@@ -18,6 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from kumite import toml
 from kumite.body.segments import Body, lay_body
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.clip import LIMBS, ClipSet, Skeleton
 from kumite.errors import KumiteError, unknown
 from kumite.files import writing
@@ -31,6 +32,7 @@ SWORD = "sword"
 _CARRIED = {"hand": ("forearm", "hand"), "foot": ("shin", "foot")}
 
 
+@checked
 @brief
 @dataclass(frozen=True)
 class Spheres:
@@ -72,6 +74,7 @@ class Spheres:
         return np.ascontiguousarray(np.moveaxis(self.at(position, world), -1, -2), np.float32)
 
 
+@checked
 def lay_spheres(
     skeleton: Skeleton, body: Body | None = None, *, thicker: float = THICKER
 ) -> Spheres:
@@ -99,6 +102,7 @@ def lay_spheres(
     return Spheres(np.array(joint), np.array(centre), np.array(radius))
 
 
+@checked
 def limb_spheres(
     skeleton: Skeleton, limb: str, body: Body | None = None, *, thicker: float = THICKER
 ) -> Spheres:
@@ -119,6 +123,7 @@ def limb_spheres(
     return lay_spheres(skeleton, Body(tuple(body.parts[r] for r in rows), *arrays), thicker=thicker)
 
 
+@checked
 def strikes_with(skeleton: Skeleton, limb: str) -> str:
     """What strikes when a limb does: the limb, or the sword in its hand."""
     if SWORD in skeleton.roles and skeleton.tip(limb)[0] == skeleton.joint(SWORD):
@@ -151,6 +156,7 @@ class _File(BaseModel):
     sphere: tuple[_Sphere, ...] = Field(min_length=1)
 
 
+@checked
 def save_spheres(path: Path | str, spheres: Spheres, skeleton: Skeleton) -> None:
     """A TOML file of them, one ``[[sphere]]`` each, that can be edited."""
     names = skeleton.names
@@ -170,6 +176,7 @@ def save_spheres(path: Path | str, spheres: Spheres, skeleton: Skeleton) -> None
         temporary.write_text("".join(rows), "utf-8", newline="\n")
 
 
+@checked
 def load_spheres(path: Path | str, skeleton: Skeleton) -> Spheres:
     """Errors: a file that is missing, no TOML, or names a joint that the skeleton has not."""
     path = Path(path)

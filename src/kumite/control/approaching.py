@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.control.preparation import (
     Motions,
     PreparationPolicy,
@@ -33,6 +34,7 @@ WALK = "walk"  # how the labels of walks begin
 MOVES = 0.15  # m/s: who is slower stands
 
 
+@checked
 @brief
 @dataclass(frozen=True)
 class Approach:
@@ -52,6 +54,7 @@ class Approach:
             object.__setattr__(self, name, array)
 
 
+@checked
 def approach_motions(
     library: Layer,
     settings: PreparationSettings | None = None,
@@ -112,6 +115,7 @@ def _name(label: str, core: int, shared: bool, steer: float) -> str:
     return f"{name} {'left' if steer > 0 else 'right'} {abs(np.degrees(steer)):.3g}°"
 
 
+@checked
 def trained_approach(
     library: Layer,
     folder: Path | str | None,

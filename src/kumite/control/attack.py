@@ -14,7 +14,8 @@ import numpy as np
 
 from kumite.body import Spheres, limb_spheres
 from kumite.brief import brief
-from kumite.checks import freeze
+from kumite.checked import checked
+from kumite.checks import array, freeze, number
 from kumite.clip import Skeleton, forward_kinematics
 from kumite.control.rules import GRAVITY
 from kumite.errors import KumiteError
@@ -28,6 +29,7 @@ LONGEST = 600.0  # s
 NEAR = 2.0  # m from a character's root over the ground: only there an attack counts
 
 
+@checked
 @brief
 @dataclass(frozen=True)
 class Attack:
@@ -126,9 +128,9 @@ def thrown(
 
     Errors: not finite, a radius or speed that makes no sense.
     """
-    p, v = np.array(position, dtype=float), np.array(velocity, dtype=float)
-    if p.shape != (3,) or v.shape != (3,) or not (np.isfinite(p).all() and np.isfinite(v).all()):
-        raise KumiteError(f"attack {name!r}: expected a finite place and velocity of 3 numbers")
+    p = array(position, f"attack {name!r}: expected a finite place and velocity: place", (3,))
+    v = array(velocity, f"attack {name!r}: expected a finite place and velocity: velocity", (3,))
+    radius = number(radius, f"attack {name!r}: radius", least=SMALLEST, most=LARGEST, unit="m")
     if not (0 < seconds <= LONGEST and np.isfinite(gravity) and np.isfinite(when)):
         raise KumiteError(
             f"attack {name!r}: expected a finite time and gravity, above 0 to {LONGEST:g} s"

@@ -44,6 +44,7 @@ from kumite.annotate import DIRECTIONS, KINDS, NO_LIMB, Actions
 from kumite.annotate.contacts import velocity
 from kumite.annotate.kinds import OUTWARD, UPWARD, strike_directions
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.checks import freeze
 from kumite.clip import LIMBS, ClipSet, tip_positions
 from kumite.errors import KumiteError, unknown
@@ -72,6 +73,7 @@ AT = "@"  # between the label and the place of one action: "jab@left_jabs:41"
 ANNOTATED = ("attack", "defence")
 
 
+@checked
 @brief
 @dataclass(frozen=True)
 class Annotations:
@@ -103,6 +105,7 @@ def suitability(defences: Annotations, attacks: Annotations) -> np.ndarray:
 # From the motion ---------------------------------------------------------------------------------
 
 
+@checked
 def annotate_actions(library: Layer, actions: Actions) -> Annotations:
     """What each action [A] of a library's clips hits or protects, told from its motion.
 
@@ -242,6 +245,7 @@ def _covered(body: _Body, frames: slice) -> np.ndarray:
 # The table ---------------------------------------------------------------------------------------
 
 
+@checked
 @dataclass(frozen=True)
 class Entry:
     """What one line of a table says of all actions with a label, or of one of them."""
@@ -269,6 +273,7 @@ class Entry:
         return f"{zlib.crc32(words.encode('utf-8', 'replace')) & 0xFFFFFF:06x}"
 
 
+@checked
 @dataclass(frozen=True)
 class Pair:
     """A suitability that a person gives a pair of actions, whatever their annotations."""
@@ -286,6 +291,7 @@ class Pair:
         object.__setattr__(self, "suitability", float(self.suitability))
 
 
+@checked
 @dataclass(frozen=True)
 class CombinationTable:
     """How well each action suits each action of the opponent, and what says so."""
@@ -383,6 +389,7 @@ class CombinationTable:
         return tuple(sorted(entries, key=key))
 
 
+@checked
 def build_table(
     library: Layer, actions: Actions, annotations: Annotations | None = None
 ) -> CombinationTable:

@@ -34,6 +34,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from kumite import files, toml
 from kumite.annotate import Actions
+from kumite.checked import checked
 from kumite.control.combination import (
     ANNOTATED,
     HIT_DIRECTIONS,
@@ -89,6 +90,7 @@ class _File(_Model):
 # Reading -----------------------------------------------------------------------------------------
 
 
+@checked
 def read_table(path: Path | str, library: Layer, actions: Actions) -> CombinationTable:
     """The table that a file gives a library's actions; what it does not say, their motion does.
 
@@ -220,6 +222,7 @@ def _pair_key(pair: Pair | _PairLine) -> str:
 # Writing -----------------------------------------------------------------------------------------
 
 
+@checked
 def write_table(
     path: Path | str, table: CombinationTable, *, keep: bool = True
 ) -> CombinationTable:

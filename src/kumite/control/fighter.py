@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.control.policy import Policy, Tracks, frame_discount, reward_params
 from kumite.control.rules import Temper
 from kumite.graph import Layer
@@ -93,6 +94,7 @@ def _discs(tracks: Tracks) -> np.ndarray:
     return np.column_stack([middle, np.maximum.reduceat(away, start[:-1])])
 
 
+@checked
 class Fighters:
     """K minds: each sees where its target will be and picks its next action.
 

@@ -6,9 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kumite.checked import checked
+from kumite.checks import array
 from kumite.errors import KumiteError
 
 
+@checked
 @dataclass(frozen=True)
 class TargetGrid:
     """Angles × distances × heights. Angle 0 is straight ahead (+Z), positive to the left (+X).
@@ -105,10 +108,12 @@ def heading_grid(
     )
 
 
+@checked
 def strike_grid(
     points: np.ndarray, angles: int = 10, distances: int = 10, heights: int = 4
 ) -> TargetGrid:
     """The paper's grid for punching: the bounding volume of the effective hitting points [P, 3]."""
+    points = array(points, "effective hitting points", ("P", 3))
     if len(points) == 0:
         raise KumiteError("the library holds no effective hits: there is nothing to strike with")
     angle = np.arctan2(points[:, 0], points[:, 2])

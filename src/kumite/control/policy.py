@@ -17,6 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.checks import freeze, instance, number, whole
 from kumite.clip import LIMBS
 from kumite.control.grid import TargetGrid, approach_grid, heading_grid, strike_grid
@@ -42,6 +43,7 @@ class Tracks:
     tip_start: np.ndarray  # [L + 1]
 
 
+@checked
 def stretch_tracks(library: Layer, limbs: tuple[str, ...] = LIMBS) -> Tracks:
     """Tracks of every stretch; ``limbs`` are those whose hits count."""
     table, strikes, facing = library.table, library.strikes, library.clips.facing
@@ -97,6 +99,7 @@ class Station:
             raise KumiteError("station: distance, bearing, heading and orbit must be finite")
 
 
+@checked
 @dataclass(frozen=True)
 class Behaviour:
     """What is rewarded, where it is looked up, and where it counts: data, so a user adds one."""

@@ -25,6 +25,7 @@ import numpy as np
 
 from kumite import files
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.checks import array, freeze, instance, number
 from kumite.errors import KumiteError
 from kumite.kernels import sarsa as kernels
@@ -36,6 +37,7 @@ MOST_PAIRS = 10_000_000  # states × actions: 12 bytes each, twice
 CURVE = ("changed", "mean_return", "steps", "motion_seconds", "given_up")
 
 
+@checked
 @brief
 @dataclass(frozen=True)
 class Motions:
@@ -507,6 +509,7 @@ def train(
     return learning.policy(time.perf_counter() - begin)
 
 
+@checked
 def trained_preparation(
     motions: Motions,
     folder: Path | str | None,

@@ -14,6 +14,8 @@ from dataclasses import dataclass, replace
 from math import isfinite
 from typing import TYPE_CHECKING
 
+from kumite.checked import checked
+from kumite.checks import shown
 from kumite.errors import KumiteError
 from kumite.lazy import Later
 
@@ -43,7 +45,10 @@ class CheckPoint:
         for name in ("require", "refuse"):
             given = getattr(self, name)
             put(self, name, (given,) if isinstance(given, str) else tuple(given))
-        put(self, "place", tuple(float(v) for v in self.place))
+        try:
+            put(self, "place", tuple(float(v) for v in self.place))
+        except (TypeError, ValueError):
+            raise KumiteError(f"check point: place {shown(self.place)}; expected x and z") from None
         wrong = []
         if len(self.place) != 2 or not all(map(isfinite, self.place)):
             wrong.append(f"place {self.place}; expected x and z, finite")
@@ -58,6 +63,7 @@ class CheckPoint:
             raise KumiteError("\n".join(f"check point: {what}" for what in wrong))
 
 
+@checked
 @dataclass(frozen=True)
 class Route:
     """Check points in order."""
@@ -131,6 +137,7 @@ class Missed:
     lacking: tuple[str, ...]
 
 
+@checked
 class Progress:
     """How far a character has come on a route. It is updated as often as one likes."""
 

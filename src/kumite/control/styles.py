@@ -21,6 +21,8 @@ from numbers import Real
 from typing import TYPE_CHECKING
 
 from kumite.annotate.vocabulary import DIRECTIONS, KINDS
+from kumite.checked import checked
+from kumite.checks import instance
 from kumite.errors import KumiteError, unknown
 from kumite.kernels import style as columns
 from kumite.lazy import Later
@@ -105,6 +107,9 @@ def short_range(actions: Actions) -> np.ndarray:
 
     Of an action of several blows the first decides, as it does its direction.
     """
+    from kumite.annotate import Actions
+
+    instance(actions, Actions, "actions")
     return np.isin(actions.direction, [DIRECTIONS.index(way) for way in SHORT_RANGE])
 
 
@@ -128,6 +133,7 @@ STYLES: dict[str, Style] = {
 """The paper's, Tables III and IV."""
 
 
+@checked
 def style(wanted: str | Mapping[str, object] | Style) -> Style:
     """A style by the name of a preset, or by a mapping of weights to change.
 

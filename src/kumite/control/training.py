@@ -10,6 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from kumite import files
+from kumite.checked import checked
 from kumite.control.policy import Behaviour, Policy, solve
 from kumite.errors import KumiteError
 from kumite.graph import Layer
@@ -19,6 +20,7 @@ VERSION = 1
 RESIDUAL = 1e-4
 
 
+@checked
 def trained(
     library: Layer,
     behaviour: Behaviour,

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kumite.checked import checked
 from kumite.control.fighter import Skill
 from kumite.control.grid import TargetGrid
 from kumite.errors import KumiteError
@@ -200,6 +201,7 @@ class Worth:
         return "\n".join([*lines, f"targets hit within {SOON:g} s: {share}"])
 
 
+@checked
 def measure_worth(skill: Skill, count: int = 100, seed: int = 0, *, few: int = 1) -> Worth:
     """Both aims on one set of standing targets, and coverage on another."""
     trials = around(skill, count, seed)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from kumite.annotate import KINDS
+from kumite.checked import checked
 from kumite.graph.joins import JoinMeter
 from kumite.graph.layer import Layer
 from kumite.graph.library import Library
@@ -122,6 +123,7 @@ class Assessment:
         return plain(asdict(self))
 
 
+@checked
 def assess(library: Layer) -> Assessment:
     """What a library is worth: see :class:`Assessment`."""
     clips, table, report = library.clips, library.table, library.report
@@ -168,6 +170,7 @@ SERVES = {
 """The layer that a kind of scene runs on."""
 
 
+@checked
 def assess_library(library: Library) -> tuple[dict[str, Assessment], tuple[Verdict, ...]]:
     """What each layer of a library is worth, and what the whole is good for: of each kind of scene
     the verdict on the layer that it runs on."""

@@ -14,6 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from kumite.annotate import AvoidanceParts, Contacts, Strikes
+from kumite.checked import checked
 from kumite.checks import instance
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError
@@ -81,6 +82,7 @@ def build_avoidance(
     return with_parts(library, avoidance)
 
 
+@checked
 def find_avoiding_transitions(
     clips: ClipSet,
     parts: AvoidanceParts,

@@ -11,6 +11,7 @@ import numpy as np
 
 from kumite import performer
 from kumite.annotate import find_contacts, find_cycles
+from kumite.checked import checked
 from kumite.clip import Clip, ClipSet, concatenate
 from kumite.errors import KumiteError, unknown
 from kumite.files import code_digest
@@ -28,6 +29,7 @@ ALL = "all"  # a style of all of these:
 EVERYTHING = ("boxing", "avoidance", "targets")
 
 
+@checked
 def builtin_library(
     cache: Path | None,
     progress: Callable[[str], None] = lambda stage: None,
@@ -86,6 +88,7 @@ def _kept(cache: Path | None, name: str) -> Path | None:
     return None if cache is None else cache / f"performer-{name}-{key}.kumite"
 
 
+@checked
 def builtin_layer(
     cache: Path | None,
     progress: Callable[[str], None] = lambda stage: None,

@@ -12,6 +12,7 @@ from types import MappingProxyType
 import numpy as np
 
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.clip import ClipSet
 from kumite.kernels import distance as kernels
 from kumite.rotation import conjugate, from_yaw, log, multiply, planar_apply
@@ -62,6 +63,7 @@ def joint_weights(clips: ClipSet) -> np.ndarray:
     return weight
 
 
+@checked
 def pose_features(clips: ClipSet) -> PoseFeatures:
     """Features of every frame (P = F)."""
     skeleton = clips.skeleton

@@ -25,6 +25,7 @@ from kumite.annotate import (
 )
 from kumite.annotate.kinds import strike_directions
 from kumite.body import lay_body
+from kumite.checked import checked
 from kumite.clip import LIMBS, SIDES, ClipSet, runs
 from kumite.errors import KumiteError
 from kumite.graph.distance import pose_features
@@ -46,6 +47,7 @@ MOST = 4  # targets of one name that are kept
 LONGEST = 8.0  # s
 
 
+@checked
 def marked_targets(
     clips: ClipSet, contacts: Contacts, marked: Marked
 ) -> tuple[Targets, Cycles | None]:
@@ -55,6 +57,7 @@ def marked_targets(
     return targets, hand_cycles(clips, contacts, marked.cycles) if marked.cycles else None
 
 
+@checked
 def find_targets(
     clips: ClipSet, contacts: Contacts, strikes: Strikes, *, most: int = MOST
 ) -> tuple[Targets, Cycles]:

@@ -18,6 +18,7 @@ import numpy as np
 
 from kumite.annotate.cycles import Cycles
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.checks import freeze, names, number
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError
@@ -66,6 +67,7 @@ class Targets:
         return Targets(label, self.start[i], self.stop[i], self.mark[i])
 
 
+@checked
 def authored_targets(clips: ClipSet, truths: Sequence[Truth], fps: float) -> Targets:
     """The target motions of the performer, each label once: of every one the first.
 
@@ -82,6 +84,7 @@ def authored_targets(clips: ClipSet, truths: Sequence[Truth], fps: float) -> Tar
     return Targets(tuple(rows), *(np.array(column) for column in zip(*rows.values())))
 
 
+@checked
 @brief
 @dataclass(frozen=True)
 class Hierarchy:
@@ -143,6 +146,7 @@ class Hierarchy:
         return out
 
 
+@checked
 def build_hierarchy(
     clips: ClipSet,
     cores: Cycles,
@@ -261,6 +265,7 @@ def _links(
     return (*out, distance)
 
 
+@checked
 def hierarchy_table(clips: ClipSet, hierarchy: Hierarchy) -> tuple[ActionTable, np.ndarray]:
     """The hierarchy as an action table, and what each stretch is [L] int32: the core m it is of,
     M + t for target t, -1 for a link between cores.

@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError
 from kumite.graph.distance import joint_weights
@@ -57,6 +58,7 @@ class JoinBound:
         return np.logical_and.reduce(within)
 
 
+@checked
 class JoinMeter:
     """Measures joins of a set of clips."""
 

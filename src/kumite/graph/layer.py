@@ -21,6 +21,7 @@ from kumite.annotate import (
     no_avoidance,
 )
 from kumite.brief import brief, pictured
+from kumite.checked import checked
 from kumite.checks import instance, mapping, number, text, whole
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError
@@ -45,6 +46,7 @@ _REPORTED = {
 _NO_PARTS = no_avoidance(np.zeros(1, np.int64))  # of clips that are not known yet
 
 
+@checked
 @brief
 @pictured
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 
 from kumite import files
 from kumite.annotate import Actions, AvoidanceParts, Contacts, Cycles, Strikes
+from kumite.checked import checked
 from kumite.checks import instance
 from kumite.clip import ClipSet, Skeleton
 from kumite.errors import KumiteError
@@ -53,6 +54,7 @@ def _header(layer: Layer) -> dict[str, Any]:
     }
 
 
+@checked
 def load_library(path: Path | str) -> Library:
     """Errors: missing, damaged, another kind of file, another version."""
     header, arrays = files.load(path, KIND, VERSION)

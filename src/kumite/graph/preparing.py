@@ -18,6 +18,7 @@ from kumite.annotate.contacts import velocity
 from kumite.annotate.kinds import strike_directions
 from kumite.body import Body, lay_body
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.checks import freeze
 from kumite.clip import LIMBS, ClipSet
 from kumite.errors import KumiteError
@@ -42,6 +43,7 @@ ROLLS = 0.10  # m: a foot that is lower in a blow, fast as it may be, stands or 
 KICK = 0.40  # … and who clears one strikes only with a foot that is so high, of the same
 
 
+@checked
 @brief
 @dataclass(frozen=True)
 class Preparing:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.checks import freeze, rising
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError
@@ -98,6 +99,7 @@ def _within(index: np.ndarray, count: int) -> bool:
     return bool(np.all((index >= 0) & (index < count)))
 
 
+@checked
 def fold(clips: ClipSet, transitions: Transitions, kept: np.ndarray) -> ActionTable:
     """Fold chains of frames with one way out into actions (Lee & Lee 2004, figure 2).
 

@@ -14,6 +14,7 @@ from scipy.sparse.csgraph import connected_components
 
 from kumite.annotate import AvoidanceParts, Contacts
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.clip import ClipSet
 from kumite.errors import KumiteError, unknown
 from kumite.graph.distance import PoseFeatures, pose_features, squared_distances
@@ -45,6 +46,7 @@ class Transitions:
         return len(self.source)
 
 
+@checked
 def find_transitions(
     clips: ClipSet,
     contacts: Contacts,
@@ -225,6 +227,7 @@ def _limit_from_sample(features: PoseFeatures, wanted: int) -> np.float32:
     return np.float32(np.quantile(sample, share)) if share < 1 else np.float32(np.inf)
 
 
+@checked
 def strongest_component(clips: ClipSet, transitions: Transitions) -> np.ndarray:
     """The frames [F] bool of the largest strongly connected component: no dead ends."""
     follows = np.ones(len(clips), dtype=bool)

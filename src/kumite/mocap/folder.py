@@ -15,6 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.clip import Clip, ClipSet, concatenate, resample
 from kumite.errors import KumiteError
 from kumite.mocap import infer
@@ -143,6 +144,7 @@ class _Take:
     facts: list[Fact] = field(default_factory=list)
 
 
+@checked
 def load(
     source: Source,
     *,

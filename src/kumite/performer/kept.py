@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from kumite import checks, files
+from kumite.checked import checked
 from kumite.clip import Clip, runs
 from kumite.errors import KumiteError
 from kumite.performer.perform import Performance, perform
@@ -39,6 +40,7 @@ def performed(
     return made
 
 
+@checked
 def truth_to_json(truth: Truth) -> dict[str, Any]:
     """Strikes, actions and contacts (as runs of frames) of a clip, for a file of its own."""
     contacts = {}

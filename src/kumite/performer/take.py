@@ -9,6 +9,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
+from kumite.checked import checked
 from kumite.clip import Clip
 from kumite.errors import KumiteError, unknown
 from kumite.performer.figure import Targets, lowered, pose, with_heels_raised
@@ -41,10 +42,12 @@ class Performed:
     targets: tuple[tuple[float, float, float], ...] = ()  # of each blow
 
 
+@checked
 def as_written(move: Move) -> Performed:
     return Performed(move, 1.0, move.travel, tuple(b.target for b in move.blows))
 
 
+@checked
 def vary(move: Move, style: Style, rng: np.random.Generator) -> Performed:
     """A move as a person does it the next time: other pace, other length, another target."""
     x, z, yaw = move.travel
@@ -97,6 +100,7 @@ class _Track:
         return gaussian_filter1d(smooth, self.smoothing * FPS, axis=0, mode="nearest")
 
 
+@checked
 def perform_take(
     name: str, score: Sequence[Performed], style: Style, *, rng: np.random.Generator
 ) -> tuple[Clip, Truth]:

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from kumite.annotate import Actions
+from kumite.checked import checked
 from kumite.errors import KumiteError
 from kumite.graph import Layer
 from kumite.rotation import from_yaw, multiply, planar_apply, planar_inverse
@@ -17,6 +18,7 @@ from kumite.scene.stage import Playback
 WHO = "actor"
 
 
+@checked
 def action_recording(library: Layer, action: int) -> Recording:
     """An action as it was captured, from the origin and facing +Z, with the blows in it.
 
@@ -60,6 +62,7 @@ def _actions(library: Layer) -> Actions:
     return actions
 
 
+@checked
 class ActionPlayback(Playback):
     """A library's actions on the stage. Errors: a library without actions."""
 

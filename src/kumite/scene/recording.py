@@ -14,6 +14,7 @@ import numpy as np
 
 from kumite import checks, files
 from kumite.brief import brief, pictured
+from kumite.checked import checked
 from kumite.clip import Clip, Skeleton
 from kumite.errors import KumiteError, unknown
 from kumite.scene.events import Event, read_events
@@ -207,6 +208,7 @@ def save_recording(path: Path | str, recording: Recording) -> None:
     files.save(path, KIND, VERSION, header, arrays)
 
 
+@checked
 def load_recording(path: Path | str) -> Recording:
     """Errors: missing, damaged, another kind of file, another version, shapes that do not fit."""
     header, arrays = files.load(path, KIND, VERSION)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from kumite.checked import checked
 from kumite.checks import number
 from kumite.errors import KumiteError
 from kumite.scene.bout import BoutScene
@@ -20,6 +21,7 @@ from kumite.scene.recording import NO_FRAME, Recording
 MOST_BYTES = 16e9  # of one recording
 
 
+@checked
 def record(
     scene: LiveScene | BoutScene | DodgeScene | EvasionScene | PrepareScene,
     seconds: float,

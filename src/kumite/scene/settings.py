@@ -10,6 +10,7 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from kumite import toml
+from kumite.checked import checked
 from kumite.errors import KumiteError
 from kumite.scene import catalogue
 from kumite.scene.settings_base import ARENA, FARTHEST, NEAREST, Finite, Metres, Name, Settings
@@ -328,6 +329,7 @@ class SceneSettings(Settings):
         return found
 
 
+@checked
 def with_count(settings: SceneSettings, count: int) -> SceneSettings:
     """The scene with another number of characters in its crowd, or pairs in its formation.
 
@@ -351,6 +353,7 @@ def with_count(settings: SceneSettings, count: int) -> SceneSettings:
     return SceneSettings.model_construct(**{**dict(settings), part: changed})
 
 
+@checked
 def with_throws(settings: SceneSettings, throws: int) -> SceneSettings:
     """The scene with another number of balls thrown by its seed.
 
@@ -364,12 +367,14 @@ def with_throws(settings: SceneSettings, throws: int) -> SceneSettings:
     return SceneSettings.model_construct(**{**dict(settings), "balls": balls})
 
 
+@checked
 def seconds_to_throw(settings: SceneSettings) -> float:
     """How long [s] it takes until all balls that the seed throws are thrown and down."""
     balls = settings.balls or BallsSettings()
     return balls.first + max(balls.throws - 1, 0) * balls.every + DOWN
 
 
+@checked
 def throws_within(settings: SceneSettings, seconds: float) -> SceneSettings:
     """The scene with balls thrown so much faster that all are thrown and down in a time [s].
 
@@ -394,6 +399,7 @@ def builtin_scenes() -> dict[str, SceneSettings]:
     return {name: load_scene(name) for name in catalogue.names()}
 
 
+@checked
 def load_scene(name: str) -> SceneSettings:
     """A built-in scene by name, or a TOML scene file by path.
 

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from kumite.checked import checked
 from kumite.clip import SIDES, Skeleton, facing_frame
 from kumite.errors import KumiteError
 from kumite.graph import Layer
@@ -30,6 +31,7 @@ SPRINGS = kernels.Springs(JOIN_HALF_LIFE, ROOT_HALF_LIFE, REACTION_HALF_LIFE, LO
 BLOW_BEFORE, BLOW_AFTER = 0.07, 0.12  # s around the effective frames in which a blow may land
 
 
+@checked
 class Cast:
     """K characters. Arrays named as in ``kernels/character.py``; each frame overwrites the last."""
 

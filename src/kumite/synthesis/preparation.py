@@ -17,6 +17,7 @@ from scipy.ndimage import gaussian_filter1d
 from kumite.annotate.contacts import Contacts
 from kumite.annotate.cycles import Cycles, closed
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.checks import freeze
 from kumite.clip import (
     SIDES,
@@ -38,6 +39,7 @@ SIGMA = 0.15  # s, of the Gaussian filter of levels
 REACH = 2.0  # sigmas that the filter looks to either side: the rest is 5 % of the weight
 
 
+@checked
 @brief
 @dataclass(frozen=True)
 class References:
@@ -48,19 +50,19 @@ class References:
     ankle: np.ndarray  # [R, 2] m above the ground, left and right
 
     def __post_init__(self) -> None:
-        count, joints = np.shape(self.wxyz)[:2]
         freeze(
             self,
             "reference postures",
-            wxyz=(float, (count, joints, 4)),
-            root=(float, (count, 2)),
-            ankle=(float, (count, 2)),
+            wxyz=(float, ("R", "J", 4)),
+            root=(float, ("R", 2)),
+            ankle=(float, ("R", 2)),
         )
 
     def __len__(self) -> int:
         return len(self.wxyz)
 
 
+@checked
 def references(clips: ClipSet, frames: Sequence[int] | np.ndarray) -> References:
     """The poses of frames as reference postures. Errors: frames that there are not."""
     f = np.asarray(frames, dtype=np.int64).reshape(-1)
@@ -94,6 +96,7 @@ def blended(postures: References, weights: np.ndarray) -> References:
     return References(wxyz, w @ postures.root, w @ postures.ankle)
 
 
+@checked
 def curves(skeleton: Skeleton, given: Mapping[str, float] | None = None) -> np.ndarray:
     """The constant C [J] of each joint: 1 for the root, the pelvis and the legs, 0.5 for others.
 
@@ -152,6 +155,7 @@ def checked_levels(level: np.ndarray | float) -> np.ndarray:
     return out
 
 
+@checked
 class Preparation:
     """K characters who prepare, frame by frame. Arrays are overwritten by each frame."""
 
@@ -333,6 +337,7 @@ def _checked_references(reference: np.ndarray | int, count: int, known: int) -> 
     return like
 
 
+@checked
 def prepare_clip(
     clip: Clip,
     on_ground: np.ndarray,
@@ -366,6 +371,7 @@ def prepare_clip(
     return Clip(clip.name, skeleton, clip.fps, shown.root[:, 0], shown.wxyz[:, 0], clip.notes)
 
 
+@checked
 def repeat_cycle(
     clips: ClipSet, contacts: Contacts, cycles: Cycles, cycle: int, times: int
 ) -> tuple[Clip, np.ndarray]:
@@ -387,6 +393,7 @@ def repeat_cycle(
     return Clip(cycles.label[cycle], clips.skeleton, clips.fps, root_position, rotations), ground
 
 
+@checked
 def level_displacements(
     clips: ClipSet,
     cycles: Cycles,
@@ -417,6 +424,7 @@ def level_displacements(
     return out, cycles.seconds
 
 
+@checked
 def smooth_levels(level: np.ndarray, fps: float, *, sigma: float = SIGMA) -> np.ndarray:
     """Levels [F, ...] passed through a Gaussian filter along time; sigma in seconds (0: as given).
 
@@ -432,6 +440,7 @@ def smooth_levels(level: np.ndarray, fps: float, *, sigma: float = SIGMA) -> np.
     return np.clip(smooth, 0.0, 1.0)
 
 
+@checked
 class LevelFilter:
     """The same filter while it happens: the levels of K characters, each ``delay`` seconds late."""
 

@@ -28,6 +28,7 @@ from scipy.interpolate import CubicSpline
 from kumite import rotation
 from kumite.body import Body
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.checks import freeze
 from kumite.clip import SIDES, Skeleton, forward_kinematics
 from kumite.errors import KumiteError
@@ -80,6 +81,7 @@ class Tone:
 LIMP = Tone(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
+@checked
 @brief
 @dataclass(frozen=True)
 class Pushed:
@@ -108,6 +110,7 @@ class Pushed:
         )
 
 
+@checked
 def blow_impulse(velocity: np.ndarray, limb: str = "hand") -> np.ndarray:
     """The impulse [3] N s of a limb that lands at a velocity [3] m/s relative to what it hits.
 
@@ -137,6 +140,7 @@ def _mujoco() -> Any:
     return mujoco
 
 
+@checked
 class Ragdoll:
     """One body that can be pushed. The same push gives the same bytes."""
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kumite.brief import brief
+from kumite.checked import checked
 from kumite.checks import freeze
 from kumite.clip import ClipSet, Skeleton, facing_frame
 from kumite.errors import KumiteError
@@ -42,6 +43,7 @@ SPEED_SCALE = 1.0  # m/s
 DIRECTION_WEIGHT = 2.0
 
 
+@checked
 @brief
 @dataclass(frozen=True)
 class Responses:
@@ -130,6 +132,7 @@ class Responses:
         return index, float(cost[index])
 
 
+@checked
 def find_responses(clips: ClipSet, spans: Sequence[tuple[int, int]] | np.ndarray) -> Responses:
     """The table of responses given as library frames (first, last).
 
