@@ -52,7 +52,7 @@ def test_an_event_is_made_of_plain_values_and_is_not_changed():
     assert type(hit.frame) is int and type(hit.speed) is float and hit.blocked is True
     with pytest.raises((FrozenInstanceError, AttributeError)):
         hit.speed = 1.0  # type: ignore[misc]
-    with pytest.raises(TypeError):
+    with pytest.raises(KumiteError):
         Event(1, "red")
 
 

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
+from kumite.checked import checked
 from kumite.checks import check_fields, instance, mapping, one_of, rounded, text
 from kumite.clip import LIMBS
 from kumite.errors import KumiteError, unknown
@@ -59,7 +60,7 @@ class Event:
 
     def __post_init__(self) -> None:
         if type(self) is Event:
-            raise TypeError("an event is of one of the kinds in kumite.scene.events.KINDS")
+            raise KumiteError("an event of no kind; expected one of kumite.scene.events.KINDS")
         check_fields(self, f"event {self.kind!r}")
         if self.frame < 0:
             raise KumiteError(f"event {self.kind!r}: frame: {self.frame}; expected at least 0")
@@ -444,6 +445,7 @@ KINDS: Mapping[str, type[Event]] = {
 E = TypeVar("E", bound=Event)
 
 
+@checked
 class EventIndex:
     """Events, to be asked for by kind and character; each list is in order."""
 
