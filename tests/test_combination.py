@@ -301,7 +301,7 @@ def test_a_pair_goes_before_annotations_and_may_discourage():
     [
         (("dukc", "jab", 1.0), "unknown action 'dukc'; did you mean 'duck'"),
         (("duck", "jab@a:2", 1.0), "unknown place of action 'jab': 'a:2'; did you mean 'a:20'"),
-        (("duck", "jab", float("nan")), "expected a finite number"),
+        (("duck", "jab", float("nan")), "expected a number"),
     ],
 )
 def test_pairs_that_cannot_be_are_refused(pair: tuple, message: str):
