@@ -43,7 +43,7 @@ from kumite.graph.whole import uncut
 from kumite.performer import perform
 from kumite.rotation import from_axis_angle, multiply
 from tests import toys
-from tests.shared import builtin, only
+from tests.shared import builtin, only, performed
 
 FPS = 60.0
 
@@ -244,7 +244,7 @@ def test_parts_within_ranges_of_frames():
 
 
 def test_scores_are_counted_one_to_one():
-    made = perform("avoidance", seed=0, mirrored=False)
+    made = performed("avoidance")
     clips = concatenate(made.clips)
     true = true_avoidance(clips, made.truth)
     perfect = score_avoidance(clips, true, made.truth)
@@ -433,7 +433,7 @@ def test_the_command_writes_and_scores_parts(tmp_path: Path):
 
 @pytest.fixture(scope="module")
 def avoider() -> ClipSet:
-    return concatenate(perform("avoidance", seed=0, mirrored=False).clips)
+    return concatenate(performed("avoidance").clips)
 
 
 def spread(found: list[tuple[int, int]], clip_start: np.ndarray) -> AvoidanceParts:

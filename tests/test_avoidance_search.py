@@ -48,8 +48,8 @@ def case(seed: int, attacks: int = 1, radius: tuple[float, float] = (0.03, 0.12)
 
 @pytest.mark.parametrize("attacks", [1, 2])
 def test_the_twin_finds_the_same(attacks: int):
-    seen = Counter(same_as_the_twin(1000 * attacks + n, attacks) for n in range(120))
-    assert seen[Outcome.FOUND] > 6 and seen[Outcome.HIT] > 15, seen
+    seen = Counter(same_as_the_twin(1000 * attacks + n, attacks) for n in range(40))
+    assert seen[Outcome.FOUND] > 2 and seen[Outcome.HIT] > 5, seen
 
 
 @pytest.mark.jit_off

@@ -22,15 +22,14 @@ from kumite.graph import (
     marked_targets,
 )
 from kumite.graph.preparing import KINDS, Preparing
-from kumite.performer import perform
-from tests.shared import only
+from tests.shared import only, performed
 
 TAKES = ("duck_under", "jump_over", "front_kick")
 
 
 @pytest.fixture(scope="module")
 def made():
-    return perform("targets", mirrored=False)
+    return performed("targets")
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +83,7 @@ def test_of_a_name_no_more_are_kept_than_wanted(takes: ClipSet):
 
 
 def test_clips_without_targets():
-    walk = next(c for c in perform("locomotion", mirrored=False).clips if c.name == "walk")
+    walk = next(c for c in performed("locomotion").clips if c.name == "walk")
     clips = concatenate([walk])
     with pytest.raises(KumiteError, match=r"no target motion in 1 clip\(s\) .*\(mark it by hand"):
         find_targets(clips, find_contacts(clips), find_strikes(clips))

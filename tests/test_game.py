@@ -83,14 +83,14 @@ def same_edges(toy: Toy, now: Moment) -> None:
         assert more == pytest.approx(toy.leaf(edge.state), abs=1e-7)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10**6), st.booleans())
 def test_expand_and_leaves_as_the_twin(seed: int, brawl: bool):
     toy, now = random_toy(seed, brawl)
     same_edges(toy, now)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10**6), st.booleans())
 def test_in_an_arena_as_the_twin(seed: int, brawl: bool):
     toy, now = random_toy(seed, brawl)

@@ -30,22 +30,22 @@ from kumite.clip import Clip, ClipSet, concatenate, facing_frame
 from kumite.errors import KumiteError
 from kumite.graph import Targets, authored_targets, build_hierarchy, hierarchy_table, pose_features
 from kumite.graph.hierarchy import pose_distances
-from kumite.performer import perform
 from kumite.rotation import angle, from_axis_angle, planar_compose, planar_inverse
 from tests import toys
+from tests.shared import performed
 
 GOING = ("run", "walk", "walk_back", "walk_left", "walk_right", "walk_turn_left", "walk_turn_right")
 
 
 @pytest.fixture(scope="module")
 def walks() -> tuple[ClipSet, Contacts]:
-    clips = concatenate(list(perform("locomotion", mirrored=False).clips))
+    clips = concatenate(list(performed("locomotion").clips))
     return clips, find_contacts(clips)
 
 
 @pytest.fixture(scope="module")
 def errands():
-    made = perform("targets", mirrored=False)
+    made = performed("targets")
     clips = concatenate(list(made.clips))
     return clips, find_contacts(clips), authored_targets(clips, made.truth, 60.0)
 

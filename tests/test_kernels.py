@@ -12,6 +12,8 @@ import pytest
 
 import kumite
 
+ROOT = Path(__file__).parents[1]
+
 PLUGS = """
 import sys
 from kumite.kernels.jit import kernel, plugged
@@ -134,14 +136,14 @@ def test_a_function_compiled_both_ways_is_kept_as_both(tmp_path: Path):
 def test_crowds_are_shown_by_what_is_compiled_first(tmp_path: Path):
     """A crowd before anybody alone: loops on all cores are compiled from nothing."""
     script = (
-        "from kumite.graph import builtin_layer; from kumite.kernels import character\n"
-        "from kumite.synthesis import Cast\n"
-        "cast = Cast(builtin_layer(None), character.MANY)\n"
+        "from kumite.kernels import character; from kumite.synthesis import Cast\n"
+        "from tests.shared import builtin\n"
+        "cast = Cast(builtin(), character.MANY)\n"
         "cast.show(0.0); print(character.show_many.signatures != [])"
     )
     environment = {
         **os.environ,
-        "PYTHONPATH": str(Path(kumite.__file__).parent.parent),
+        "PYTHONPATH": os.pathsep.join(map(str, (Path(kumite.__file__).parents[1], ROOT))),
         "NUMBA_CACHE_DIR": str(tmp_path),
     }
     done = subprocess.run(

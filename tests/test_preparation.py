@@ -17,7 +17,6 @@ from kumite.clip import SIDES, ClipSet, concatenate, facing_frame, forward_kinem
 from kumite.errors import KumiteError
 from kumite.graph import Layer, authored_targets, build_hierarchy, hierarchy_table
 from kumite.kernels import preparation as kernels
-from kumite.performer import perform
 from kumite.rotation import angle, planar_compose, planar_inverse, rotate
 from kumite.synthesis import (
     Cast,
@@ -32,13 +31,14 @@ from kumite.synthesis import (
     smooth_levels,
 )
 from kumite.synthesis.preparation import blended, weights
+from tests.shared import performed
 
 
 class Walker:
     """A walk of six cycles, what it is from, and what it prepares for: duck under, punch."""
 
     def __init__(self) -> None:
-        made = perform("targets", mirrored=False)
+        made = performed("targets")
         self.clips: ClipSet = concatenate(list(made.clips))
         self.contacts = find_contacts(self.clips)
         self.cycles = find_cycles(self.clips, self.contacts)
@@ -423,7 +423,7 @@ def test_the_filter_that_runs_is_the_one_that_looks_back():
 def test_who_plays_the_graph_prepares_without_jumps(walker: Walker):
     """Thirty seconds of random ways through cores, links and targets, prepared now and then."""
     clips, contacts = walker.clips, walker.contacts
-    made = perform("targets", mirrored=False)
+    made = performed("targets")
     targets = authored_targets(clips, made.truth, 60.0)
     table, _ = hierarchy_table(clips, build_hierarchy(clips, walker.cycles, targets))
     cast = Cast(Layer(clips, contacts, find_strikes(clips), table), 1)

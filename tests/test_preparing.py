@@ -24,9 +24,8 @@ from kumite.graph import (
 from kumite.graph.library_file import VERSION
 from kumite.graph.preparing import KINDS, MARGIN, PLACE, Preparing, find_about
 from kumite.kernels import passing
-from kumite.performer import perform
 from kumite.rotation import planar_apply, planar_inverse, rotate
-from tests.shared import builtin, only
+from tests.shared import builtin, only, performed
 
 ABOUT = {
     "duck_under": "under",
@@ -91,9 +90,11 @@ def test_obstacles_are_cleared_as_points_on_the_body_say(library, preparing, lab
     way = np.array([np.sin(preparing.way[t]), np.cos(preparing.way[t])])
     along, height = seen[..., [0, 2]] @ way, seen[..., 1]
     under = KINDS[preparing.kind[t]] == "under"
+    order = np.argsort(along, axis=None)
+    in_order, heights = along.ravel()[order], height.ravel()[order]
 
     def clear(at: float, wide: float) -> float:
-        near = height[np.abs(along - at) <= wide]
+        near = heights[slice(*np.searchsorted(in_order, [at - wide, at + wide]))]
         return float(near.max() if under else near.min())
 
     at = float(preparing.place[t, [0, 2]] @ way)
@@ -126,7 +127,7 @@ def test_strikes_hit_where_and_when_they_were_authored(library, preparing, label
     clips, targets = library.clips, preparing.hierarchy.targets
     t = targets.label.index(label)
     limb, contact, start = (int(x[t]) for x in (preparing.limb, preparing.contact, targets.start))
-    made = perform("targets", mirrored=False)
+    made = performed("targets")
     clip = int(clips.clip_of_frame[contact])
     first = int(clips.clip_start[clip])
     authored = min(made.truth[clip].strikes, key=lambda s: abs(s.frame + first - contact))
@@ -288,7 +289,7 @@ def test_cores_may_be_given_or_found(library):
 
 
 def test_authored_targets_at_another_rate():
-    made = perform("targets", mirrored=False)
+    made = performed("targets")
     clips = concatenate(list(made.clips), 30.0)
     built = build_preparation(clips, authored_targets(clips, made.truth, 60.0))
     told = {

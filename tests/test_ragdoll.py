@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from kumite import performer, rotation
+from kumite import rotation
 from kumite.annotate import find_contacts
 from kumite.body import Body, keep_out, lay_body
 from kumite.body.apart import DIRECTIONS, NEAR, NO_PART, posed
@@ -21,6 +21,7 @@ from kumite.synthesis.ragdoll import EFFECTIVE_MASS, LIMP
 from kumite.synthesis.recoil import recoiling
 from kumite.synthesis.response import FALL, FLINCH, SIZES, STAGGER
 from tests import toys
+from tests.shared import performed
 
 SECONDS = 0.25
 
@@ -321,7 +322,7 @@ def test_the_order_of_the_joints_does_not_matter(physics):
 
 def test_an_armed_fighter_can_be_pushed(physics):
     """A sword is a joint of its own, listed after all others."""
-    clips = concatenate(performer.perform("sword", mirrored=False).clips[:1])
+    clips = concatenate(performed("sword").clips[:1])
     ragdoll = Ragdoll(clips.skeleton, lay_body(clips.skeleton), clips.fps)
     for f in standing(clips, 3):
         out, _ = struck(clips, ragdoll, f, np.zeros(3))
@@ -454,7 +455,7 @@ def test_going_on_refuses_what_it_cannot_play(library: Layer):
 
 @pytest.fixture(scope="module")
 def reactions() -> tuple[ClipSet, Responses, list[str]]:
-    performance = performer.perform("boxing", mirrored=False)
+    performance = performed("boxing")
     clips = concatenate(performance.clips)
     spans, labels = [], []
     for start, truth in zip(clips.clip_start.tolist(), performance.truth):

@@ -127,7 +127,9 @@ def test_values_equal_exhaustive_search(name: str):
 
 
 def soonest(skill: Skill, aim: str, state: int, target: np.ndarray, left: int) -> float:
-    """Frames to a target by trying every path of at most ``left`` frames; inf: none."""
+    """Frames to a target by trying every path of at most ``left`` frames that may be sooner than
+    the best so far; inf: none.
+    """
     table, tracks, best = skill.library.table, skill.tracks, np.inf
     for k in table.stretch[table.actions_of(state)]:
         if aim == "reach":
@@ -141,10 +143,10 @@ def soonest(skill: Skill, aim: str, state: int, target: np.ndarray, left: int) -
         length = int(table.duration[k])
         if len(there):
             best = min(best, float(there.min()))
-        elif length < left:
+        elif length < min(left, best - 1):
             seen = planar_apply(planar_inverse(table.displacement[k]), target)
-            later = soonest(skill, aim, int(table.target[k]), seen, left - length)
-            best = min(best, length + later)
+            sooner = int(min(left, best - 1)) - length
+            best = min(best, length + soonest(skill, aim, int(table.target[k]), seen, sooner))
     return best if best <= left else np.inf
 
 
