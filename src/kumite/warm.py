@@ -99,8 +99,9 @@ def needs_of(settings: SceneSettings, building: bool = True) -> set[str]:
         if who:
             kind = name
             break
-    levels = {of.level, "frames"} if settings.attacker else {of.level}
-    return {kind, *levels} if building else {kind}
+    kinds = {kind, "dodge"} if kind == "bout" and settings.avoiding else {kind}
+    levels = {*of.layers, "frames"} if settings.attacker else {*of.layers}
+    return kinds | levels if building else kinds
 
 
 def missing(needs: set[str] | None = None) -> list[Known]:

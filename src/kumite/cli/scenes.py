@@ -93,7 +93,7 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
     if library is not None:
         refuse_no_library(library)
     from kumite.control import cache_folder
-    from kumite.graph import builtin_layer, load_library
+    from kumite.graph import builtin_layer, builtin_library, load_library
     from kumite.scene import BoutScene, DodgeScene, EvasionScene, LiveScene, PrepareScene
     from kumite.scene.needs import needs
     from kumite.warm import warm
@@ -106,7 +106,9 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
             stages("reading the library")
             found = load_library(library)
         else:
-            found = builtin_layer(cache, progress=stages, style=needed.style, level=needed.level)
+            found = builtin_library(
+                cache, progress=stages, style=needed.style, layers=needed.layers
+            )
         if needed.attackers is not None:
             if is_library(needed.attackers):
                 attack = load_library(needed.attackers)

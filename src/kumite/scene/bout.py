@@ -15,6 +15,8 @@ import numpy as np
 from kumite.body import ARMS
 from kumite.clip import LIMBS
 from kumite.control import Progress, Route, style
+from kumite.control.avoidance import Avoidance, AvoidanceSearch, Outcome
+from kumite.control.avoider import Avoider, Threat
 from kumite.control.game_tree import (
     CALM,
     GOAL_EVERY,
@@ -25,8 +27,10 @@ from kumite.control.game_tree import (
     Others,
     Player,
 )
+from kumite.control.protocol import PASS, Controller, View
 from kumite.errors import KumiteError, unknown
 from kumite.graph import Layer, Library
+from kumite.graph.spans import Spans, nearest
 from kumite.kernels.blow import NO_BLOW, NOBODY
 from kumite.kernels.moves import FALL, NOTHING
 from kumite.rotation import planar_compose
@@ -39,6 +43,7 @@ from kumite.scene.controls import (
     check_orders,
     style_controls,
 )
+from kumite.scene.dodgers import searched, volume_of
 from kumite.scene.doors import check_scene
 from kumite.scene.events import (
     Caught,
@@ -53,12 +58,16 @@ from kumite.scene.floor import Floor, Landing
 from kumite.scene.reactions import MOST_PHYSICAL, Reactions
 from kumite.scene.settings import SceneSettings
 from kumite.scene.settings_base import ARENA, NEAREST
+from kumite.scene.settings_dodge import BallsSettings, DodgeSettings
 from kumite.scene.settings_fight import CHANGES, BoutSettings, CueSettings
 from kumite.scene.stage import SceneObject
 from kumite.scene.story import Story
+from kumite.scene.throwing import Throwing
+from kumite.synthesis.rates import FASTEST, SLOWEST
 
 NEAR = 6.0  # m within which others are minded
 FREE = 1.5  # times the distance of a catch: so far one has got away
+MOST_AT_ONCE = 8  # spans that one may begin in one frame
 GOALS = 25  # places ahead of which a fighter knows: 6 s
 
 
@@ -72,6 +81,7 @@ class BoutScene:
         """Errors: a library whose graph is not one of whole actions; names in A⁺, A⁻ or at check
         points that no action has.
         """
+        layers = library
         library = check_scene(settings, library, seed, "actions")
         if not settings.fighters:
             raise KumiteError(f"{settings.title!r} is no fight by game tree; expected [[fighter]]s")
@@ -94,10 +104,41 @@ class BoutScene:
                 wanted=cue.wanted or (), unwanted=cue.unwanted or (), only=cue.only or ()
             )
             check_orders(f"cue of {cue.who}", self.tree, orders, cue.route())
+        self.spans, self._throwing = Spans.of(Library.of(library), ("actions",)), None
+        self._avoiders: dict[int, Avoider] = {}
+        if settings.avoiding:
+            self._equip(layers)
+        self.controllers: list[list[Controller]] = [
+            [self._avoiders[k] if c == "avoid" else Fight(self) for c in f.controllers]
+            for k, f in enumerate(settings.fighters)
+        ]
         self._edge: list[SceneObject] = []
         if self.bout.arena is not None:
             self._edge.append(SceneObject(ARENA, np.zeros(3), self.bout.arena, line=True))
         self.reset(seed)
+
+    def _equip(self, library: Library | Layer) -> None:
+        """Let those who avoid see what is thrown. Errors: a library without avoidance."""
+        if isinstance(library, Layer):
+            raise KumiteError(
+                f"{self.title!r} needs the layers actions and avoidance; expected a library that "
+                "has both, not one of its layers"
+            )
+        avoidance = library.layer("avoidance")
+        self.spans = Spans.of(library, ("actions", "avoidance"))
+        calm = np.flatnonzero(np.isin(self.tree.kinds, CALM))
+        self._like, away = nearest(self.library, calm)
+        dodge = self.settings.dodge or DodgeSettings()
+        search = AvoidanceSearch(avoidance, dodge.search(), spheres=volume_of(dodge, self.skeleton))
+        _ = search.masks, search.index  # made now, not at the first throw
+        for k, name in enumerate(self.names):
+            if name in self.settings.avoiding:
+                self._avoiders[k] = Avoider(
+                    search,
+                    away,
+                    self.library.strikes,
+                    lambda found, threat, k=k: self._tell_search(k, found, threat),
+                )
 
     @property
     def controls(self) -> list[StyleControl]:
@@ -149,7 +190,7 @@ class BoutScene:
         self.decisions: list[Decision] = []
         count = len(self.names)
         rng = np.random.default_rng(self.seed)
-        self.floor = Floor(self.library, count)
+        self.floor = Floor(self.library, count, (self.spans.first, self.spans.last))
         self.cast = cast = self.floor.cast
         table = self.library.table
         number = {name: k for k, name in enumerate(self.names)}
@@ -166,6 +207,8 @@ class BoutScene:
         self.progress = [None if r is None else Progress(r) for r in self.routes]
         self._done: list[set[str]] = [set() for _ in range(count)]
         self._told = [0] * count  # check points before this one have been told if missed
+        self._elsewhere = np.zeros(count, dtype=bool)  # in a span of another layer than its stretch
+        self._charge = [0] * count  # which of its controllers chose what it does
         self._caught = np.zeros(count, dtype=bool)
         self._landed = [NO_BLOW] * count  # the blow each has landed last in what it is doing
         bout = self.bout
@@ -179,10 +222,27 @@ class BoutScene:
         for k in np.flatnonzero(self._nearest).tolist():
             self._turn_to_nearest(k)
         self.reactions.start(self.floor)
+        for controllers in self.controllers:
+            for controller in controllers:
+                controller.start()
+        if self._avoiders:
+            self._throwing = Throwing(
+                self.settings.balls or BallsSettings(),
+                cast,
+                self.floor.body,
+                next(iter(self._avoiders.values())).search.spheres,
+                self.seed,
+                sorted(self._avoiders),
+                self.names,
+                lambda k, attack, number, ball: self._avoiders[k].mind(attack, number, ball),
+                self._forget,
+                self.events.append,
+            )
 
     @property
     def objects(self) -> list[SceneObject]:
-        return self.story.objects + self._edge
+        balls = [] if self._throwing is None else self._throwing.balls.objects
+        return self.story.objects + self._edge + balls
 
     @property
     def root_position(self) -> np.ndarray:
@@ -198,15 +258,15 @@ class BoutScene:
     def step(self) -> bool:
         """One frame: who has ended an action looks ahead and chooses, all move on."""
         self.story.step(self, self.frame / self.fps)
-        for k in self.cast.waiting.tolist():
-            if self._lies(k):
-                self.cast.wait(k)
-            else:
-                self._choose(k)
+        if self._throwing is not None:
+            self._throwing.due(self.frame)
+        self._control()
         happened = self.reactions.advance()
         if len(self.names) <= MOST_PHYSICAL:  # among many trunks are kept apart, limbs are not
             push_apart(self.floor)
         self.frame += 1
+        if self._throwing is not None:
+            self._throwing.step(self.frame)
         self._pass_check_points()
         if self.bout.catch:
             self._catch()
@@ -231,22 +291,80 @@ class BoutScene:
 
     # Deciding ------------------------------------------------------------------------------------
 
-    def _choose(self, k: int) -> None:
+    def view(self, k: int) -> View:
+        """What the controllers of character k may know now."""
+        free = not (self.cast.held[k] or self._lies(k) or self._reacts(k))
+        opponent = self.floor.opponent
+        return View(k, self.frame, self.fps, self.names, opponent, self.cast, self.spans, free)
+
+    def _reacts(self, k: int) -> bool:
+        return not self._elsewhere[k] and self.tree.kinds[self.stretch[k]] == "reaction"
+
+    def _control(self) -> None:
+        """Controllers see the frame and choose where an action ends, before anybody moves."""
+        cast = self.cast
+        for k, controllers in enumerate(self.controllers):
+            if len(controllers) == 1 and isinstance(controllers[0], Fight):
+                continue  # it sees what it needs when it chooses
+            view = self.view(k)
+            for n, controller in enumerate(controllers):
+                leave = controller.watch(view)
+                # Whoever comes after the one that is heard now has to wait for the action's end.
+                if leave is not None and n <= self._charge[k]:
+                    cast.stop[k], self._charge[k] = leave, n
+                    break
+            cast.set_rate(k, self._rate(k, view))
+        for _ in range(MOST_AT_ONCE):  # again where a span is shorter than a quick frame
+            waiting = [k for k in cast.waiting.tolist() if not self._lies(k)]
+            if not waiting:
+                break
+            for k, (n, span) in [(k, self._chosen(k)) for k in waiting]:
+                self._charge[k] = n
+                self._begin(k, span)
+                if len(self.controllers[k]) > 1:
+                    cast.set_rate(k, self._rate(k, self.view(k)))
+        for k in cast.waiting.tolist():
+            cast.wait(k)
+
+    def _rate(self, k: int, view: View) -> float:
+        rate = self.controllers[k][self._charge[k]].rate(view)
+        return float(np.clip(rate, SLOWEST, FASTEST))
+
+    def _chosen(self, k: int) -> tuple[int, int]:
+        """Which controller of character k is heard, and the span it chooses."""
+        view = self.view(k)
+        for n, controller in enumerate(self.controllers[k]):
+            span = controller.choose(view)
+            if span != PASS:
+                return n, int(span)
+        raise KumiteError(f"{self.names[k]}: no controller has chosen an action; expected one")
+
+    def choose_by_tree(self, k: int) -> int:
+        """What character k does next, as its game tree says: a stretch."""
         if self._nearest[k]:
             self._turn_to_nearest(k)
         cast, table, o = self.cast, self.library.table, int(self.floor.opponent[k])
         reached = cast.reached
         facing = cast.facing_at(reached)
         pair = (k, o)
+        for p in pair:
+            if self._elsewhere[p]:
+                self.stretch[p] = self._like[reached[p]]
         late = self.reactions.late
-        local = [int(reached[p] - table.first[self.stretch[p]] + 1 - late[p]) for p in pair]
+        # Who is in another layer's span counts as at the end of what it will be like then.
+        local = [
+            int(table.duration[self.stretch[p]])
+            if self._elsewhere[p]
+            else int(reached[p] - table.first[self.stretch[p]] + 1 - late[p])
+            for p in pair
+        ]
         begun = (float(self.frame - local[0]), float(self.frame - local[1]))
         state = self.tree.state(
             (int(self.stretch[k]), int(self.stretch[o])),
             begun,
             (
                 begun[0] + float(table.duration[self.stretch[k]]),
-                begun[1] + float(table.duration[self.stretch[o]]),
+                begun[1] + float(table.duration[self.stretch[o]]) + self._still_elsewhere(o),
             ),
             (facing[k], facing[o]),
             float(self.frame),
@@ -257,7 +375,6 @@ class BoutScene:
         decision = self.tree.decide(state, players, tuple(self._recent[k]), others)
         self.decisions.append(decision)
         self._recent[k].append(decision.stretch)
-        self._begin(k, decision.stretch)
         self.events.append(
             events.Decision(
                 self.frame,
@@ -270,11 +387,23 @@ class BoutScene:
                 nodes=int(decision.nodes.sum()),
                 considered=int(decision.considered.sum()),
                 pruned=decision.pruned,
-                jump=bool(cast.jump[k]),
+                jump=self._jumps(k, decision.stretch),
                 outside_set=decision.outside,
                 flaws=", ".join(decision.flaws),
             )
         )
+        return decision.stretch
+
+    def _still_elsewhere(self, k: int) -> float:
+        """Frames until character k, if it is in another layer's span, may choose again."""
+        if not self._elsewhere[k]:
+            return 0.0
+        cast = self.cast
+        return float(max(cast.stop[k] - cast.frame[k], 0) / cast.rate[k])
+
+    def _jumps(self, k: int, stretch: int) -> bool:
+        """Whether a stretch begins with a join, where character k is."""
+        return int(self.cast.reached[k]) != int(self.library.table.first[stretch]) - 1
 
     def _turn_to_nearest(self, k: int) -> None:
         """Character k minds the nearest of those who are after it, or of all."""
@@ -326,15 +455,30 @@ class BoutScene:
         way = place[k] - place[self.floor.opponent[k]]
         return 0.5 * self.players[k].style.preferred_distance * way / max(np.hypot(*way), 1e-9)
 
-    def _begin(self, k: int, stretch: int) -> None:
-        """Character k begins a stretch now, whatever it does."""
-        chosen = np.full(len(self.names), stretch)
+    def _begin(self, k: int, span: int) -> None:
+        """Character k begins a span now, whatever it does."""
+        chosen = np.full(len(self.names), span)
         self.cast.begin(np.array([k]), chosen)
-        self._does(k, stretch)
+        layer, stretch = self.spans.stretch(span)
+        if layer == "actions":
+            self._does(k, stretch)
+            return
+        self._elsewhere[k] = True
+        self.stretch[k] = self._like[self.spans.last[span]]  # it goes on as after that
+        self._landed[k] = NO_BLOW
+        self.events.append(
+            events.Decision(
+                self.frame,
+                self.names[k],
+                by=self.controllers[k][self._charge[k]].name,
+                stretch=stretch,
+                jump=bool(self.cast.jump[k]),
+            )
+        )
 
     def _does(self, k: int, stretch: int) -> None:
         """Character k is in a stretch from now on."""
-        self.stretch[k] = stretch
+        self.stretch[k], self._elsewhere[k] = stretch, False
         self._landed[k] = NO_BLOW
         self._done[k] |= {self.tree.kinds[stretch], self.tree.labels[stretch]}
 
@@ -366,7 +510,27 @@ class BoutScene:
             return
         begin = self._does if reaction.begun else self._begin
         begin(landing.victim, reaction.stretch)
+        self._interrupt(landing.victim)
         self.events.append(reaction.told(self.frame, self.names[landing.victim]))
+
+    def _interrupt(self, k: int) -> None:
+        """What character k did has been cut short; the last of its controllers goes on."""
+        view = self.view(k)
+        for controller in self.controllers[k]:
+            controller.interrupted(view)
+        self._charge[k] = len(self.controllers[k]) - 1
+
+    def _forget(self, number: int) -> None:
+        """What was thrown is over."""
+        for avoider in self._avoiders.values():
+            avoider.forget(number)
+
+    def _tell_search(self, k: int, found: Avoidance, threat: Threat) -> None:
+        if found.outcome == Outcome.FOUND and self._throwing is not None:
+            self._throwing.found(threat.number)
+        self.events.append(
+            searched(self.frame, self.names[k], found, threat.number, ball=threat.name)
+        )
 
     # The story -----------------------------------------------------------------------------------
 
@@ -395,6 +559,7 @@ class BoutScene:
         if fall != NOTHING and not self._lies(k):
             self.reactions.forget(k)
             self._begin(k, fall)
+            self._interrupt(k)
 
     def drag(self, k: int, way: np.ndarray) -> None:
         """Character k is moved over the ground by way [2] m, feet and all."""
@@ -442,6 +607,30 @@ class BoutScene:
                     )
                 )
                 self._told[k] = m.index + 1
+
+
+class Fight:
+    """The controller of a fighter that looks ahead by game tree. It always has something to do."""
+
+    name = "fight"
+
+    def __init__(self, scene: BoutScene) -> None:
+        self._scene = scene
+
+    def start(self) -> None:
+        """Nothing is kept from before."""
+
+    def watch(self, view: View) -> int | None:
+        return None
+
+    def choose(self, view: View) -> int:
+        return self._scene.choose_by_tree(view.me)
+
+    def rate(self, view: View) -> float:
+        return 1.0
+
+    def interrupted(self, view: View) -> None:
+        """It looks ahead anew whenever an action has ended."""
 
 
 def _is_shared(progress: Progress) -> bool:

@@ -5,22 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from kumite.body import lay_body
-from kumite.control.attack import thrown
+from kumite.control.attack import Attack, thrown
 from kumite.control.avoidance import AvoidanceSearch, Outcome
 from kumite.errors import KumiteError
 from kumite.graph import Layer, Library
-from kumite.scene.balls import Balls, aimed, capsules_of, velocity_to
+from kumite.scene.balls import Balls
 from kumite.scene.controls import SearchControl, search_controls
 from kumite.scene.dodgers import Dodgers, background, volume_of
 from kumite.scene.doors import check_scene
-from kumite.scene.events import Avoided, Event, Missed, Searched, Struck, Throw, place
+from kumite.scene.events import Event, Searched
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.settings_dodge import BallsSettings, DodgeSettings
 from kumite.scene.stage import SceneObject
-
-AIM_SPREAD = 0.03  # m by which throws miss the middle of what they are aimed at
-TRUE = 0.10  # m from a body as it stands: a ball that passes no farther off was aimed well
-RECOIL = 0.01  # m that a struck segment gives way per m/s of the ball
+from kumite.scene.throwing import Throwing
 
 
 class DodgeScene:
@@ -69,13 +66,20 @@ class DodgeScene:
         self.dodgers = Dodgers(
             self.search, self.names, homes, rng, self._tell, latency=self.dodge.latency
         )
-        # What is thrown does not depend on how it is avoided: searches can be compared.
-        self._thrower, self._by_seed = np.random.default_rng([self.seed, 1]), 0
-        self._by_hand = np.random.default_rng([self.seed, 2])
-        self.balls = Balls(self.balls_settings, self.body, self.fps)
-        self._number: dict[int, tuple[int, int]] = {}  # ball -> number of the throw, whom at
-        self._minded: set[int] = set()  # throws that would have met somebody
-        self._capsules = self._pose()
+        self.throwing = Throwing(
+            self.balls_settings,
+            self.cast,
+            self.body,
+            self.search.spheres,
+            self.seed,
+            list(range(len(self.names))),
+            self.names,
+            self._mind,
+            self.dodgers.forget,
+            self._tell,
+        )
+        if self._streams is not None:
+            self.throwing.streams = self._streams
 
     @property
     def cast(self):
@@ -109,15 +113,19 @@ class DodgeScene:
         self.dodgers.search = self.search
 
     @property
+    def balls(self) -> Balls:
+        """What is thrown."""
+        return self.throwing.balls
+
+    @property
     def streams(self) -> bool:
         """Whether balls come by themselves."""
-        return (
-            self._by_seed < self.balls_settings.throws if self._streams is None else self._streams
-        )
+        return self.throwing.streams
 
     @streams.setter
     def streams(self, on: bool) -> None:
         self._streams = on
+        self.throwing.streams = on
 
     def throw(
         self,
@@ -127,113 +135,26 @@ class DodgeScene:
         at: int = 0,
         radius: float | None = None,
     ) -> None:
-        """Throw a ball from a place [3] so that it comes by a goal [3]; speed [m/s] is the mean.
-
-        at: the dodger who is to mind it. radius [m]: the settings' by default. Errors: a throw that
-        makes no sense.
-        """
-        gravity = self.balls_settings.gravity
-        velocity = velocity_to(np.asarray(position, float), np.asarray(goal, float), speed, gravity)
-        self._throw(np.asarray(position, dtype=float), velocity, at, radius)
+        """Throw a ball (:meth:`Throwing.throw`). at: the dodger who is to mind it."""
+        self.throwing.throw(self.frame, position, goal, speed, at, radius)
 
     def throw_one(self, speed: float | None = None, radius: float | None = None) -> None:
-        """Throw a ball as those that come by themselves, at another speed [m/s] or of another
-        radius [m]; they stay as they are.
-        """
-        s = self.balls_settings
-        s = s if speed is None else s.model_copy(update={"speed": (speed, speed)})
-        self._throw_at_someone(self._by_hand, s, radius)
-
-    def _throw(
-        self, position: np.ndarray, velocity: np.ndarray, at: int, radius: float | None = None
-    ) -> None:
-        n = self.balls.throw(position, velocity, self.frame / self.fps, radius)
-        number = self.balls.thrown
-        if n in self._number:
-            self._over(n)
-        attack = self.balls.attack[n]
-        assert attack is not None
-        self._number[n] = (number, at)
-        cast, spheres = self.cast, self.search.spheres
-        body = spheres.at(cast.position[at], cast.world_wxyz[at])
-        if attack.nearest(body, spheres.radius) < TRUE:
-            self._minded.add(number)
-        ball = self.balls.objects[n].name
-        self._tell(
-            Throw(
-                self.frame,
-                self.names[at],
-                attack=number,
-                ball=ball,
-                speed=float(np.linalg.norm(velocity)),
-                place=place(position),
-            )
-        )
-        for k in range(len(self.names)):
-            if self.dodge.searches and (k == at or self._comes_near(attack, k)):
-                self.dodgers.menace(k, attack, number, ball=ball)
-
-    def _comes_near(self, attack, k: int) -> bool:
-        off = attack.centre[:, 0, [0, 2]] - self.root_position[k, [0, 2]]
-        return bool(np.any(np.hypot(off[:, 0], off[:, 1]) < 2.0))
+        """Throw a ball as those that come by themselves (:meth:`Throwing.throw_one`)."""
+        self.throwing.throw_one(self.frame, speed, radius)
 
     def step(self) -> bool:
         """One frame: throws that are due, searches and edges, balls and what they meet."""
-        s, now = self.balls_settings, self.frame / self.fps
-        while now >= s.first + self._by_seed * s.every - 1e-9:
-            if self.streams:
-                self._throw_at_someone(self._thrower, s)
-            self._by_seed += 1
+        self.throwing.due(self.frame)
         self.dodgers.step(self.frame)
-        before, self._capsules = self._capsules, self._pose()
         self.frame += 1
-        hits = self.balls.step(self.root_position, np.stack([before, self._capsules]))
-        for n, k, part, velocity in hits:
-            number, at = self._number[n]
-            joint, where = int(self.body.joint[part]), self.balls.position[n]
-            self._tell(
-                Struck(
-                    self.frame,
-                    self.names[k],
-                    attack=number,
-                    ball=self.balls.objects[n].name,
-                    part=self.body.parts[part],
-                    meant=at == k,
-                    speed=float(np.linalg.norm(velocity)),
-                    place=place(where),
-                )
-            )
-            self.dodgers.forget(number)
-            self.cast.strike(k, joint, where, RECOIL * velocity)
-            del self._number[n]
-        for n in [n for n in self._number if self.balls.attack[n] is None]:
-            self._over(n)
+        self.throwing.step(self.frame)
         return True
 
-    def _over(self, n: int) -> None:
-        """A ball has come down without having met anybody: avoided, if it would have met whom it
-        was thrown at or somebody has found a way out, else only missed."""
-        number, at = self._number.pop(n)
-        how = Avoided if number in self._minded else Missed
-        ball = self.balls.objects[n].name
-        self._tell(how(self.frame, self.names[at], attack=number, ball=ball))
-        self._minded.discard(number)
-        self.dodgers.forget(number)
-
-    def _throw_at_someone(
-        self, rng: np.random.Generator, settings: BallsSettings, radius: float | None = None
-    ) -> None:
-        cast = self.cast
-        at = int(rng.integers(len(self.names)))
-        spheres = self.search.spheres
-        goal = spheres.at(cast.position[at], cast.world_wxyz[at])[rng.integers(len(spheres))]
-        goal = goal + rng.normal(0.0, AIM_SPREAD, 3)
-        self._throw(*aimed(rng, settings, cast.facing[at], goal), at, radius)
-
-    def _pose(self) -> np.ndarray:
-        return capsules_of(self.body, self.cast.position, self.cast.world_wxyz)
+    def _mind(self, k: int, attack: Attack, number: int, ball: str) -> None:
+        if self.dodge.searches:
+            self.dodgers.menace(k, attack, number, ball=ball)
 
     def _tell(self, event: Event) -> None:
         if isinstance(event, Searched) and event.outcome == Outcome.FOUND:
-            self._minded.add(event.attack)
+            self.throwing.found(event.attack)
         self.events.append(event)

@@ -234,7 +234,11 @@ class Dodgers:
         """Take up what has been found against an attack."""
         if found.outcome not in menace.told or found.outcome == Outcome.FOUND:
             menace.told.add(found.outcome)
-            self.tell(self._searched(k, found, menace))
+            self.tell(
+                searched(
+                    self.frame, self.names[k], found, menace.number, menace.ball, menace.attacker
+                )
+            )
         # Wide of where it is may be right where it goes next; too late remains so.
         menace.settled = found.outcome == Outcome.LATE
         if found.outcome != Outcome.FOUND or found.plan is None:
@@ -261,27 +265,6 @@ class Dodgers:
                 attacker=menace.attacker,
                 paths=1 + len(found.others),
             )
-        )
-
-    def _searched(self, k: int, found: Avoidance, menace: Menace) -> Searched:
-        """What the log says of a search."""
-        names = ("valid", "hit", "culled", "stiff", "too_fast", "too_long")
-        said: dict[str, Any] = dict(zip(names, found.counts))
-        if found.counts:
-            said["candidates"] = found.candidates
-        if np.isfinite(found.aim):
-            said["aim"] = found.aim
-        if found.outcome == Outcome.FOUND:
-            best = ("path", "part", "indexed", "scale", "cost", "costs", "distance", "before")
-            said |= {name: getattr(found, name) for name in best}
-        return Searched(
-            self.frame,
-            self.names[k],
-            attack=menace.number,
-            ball=menace.ball,
-            attacker=menace.attacker,
-            outcome=found.outcome,
-            **said,
         )
 
     # Going on ------------------------------------------------------------------------------------
@@ -344,3 +327,26 @@ def _after(path: Sequence[int], begun: Sequence[int]) -> tuple[int, ...] | None:
     if tuple(path[: len(begun)]) != tuple(begun) or len(path) < len(begun):
         return None
     return tuple(path[len(begun) :])
+
+
+def searched(
+    frame: int,
+    name: str,
+    found: Avoidance,
+    attack: int,
+    ball: str | None = None,
+    attacker: str | None = None,
+) -> Searched:
+    """What the log says of a search by ``name`` for a way out."""
+    names = ("valid", "hit", "culled", "stiff", "too_fast", "too_long")
+    said: dict[str, Any] = dict(zip(names, found.counts))
+    if found.counts:
+        said["candidates"] = found.candidates
+    if np.isfinite(found.aim):
+        said["aim"] = found.aim
+    if found.outcome == Outcome.FOUND:
+        best = ("path", "part", "indexed", "scale", "cost", "costs", "distance", "before")
+        said |= {field: getattr(found, field) for field in best}
+    return Searched(
+        frame, name, attack=attack, ball=ball, attacker=attacker, outcome=found.outcome, **said
+    )

@@ -37,12 +37,15 @@ class Landing:
 class Floor:
     """K characters as arrays, and who aims at whom."""
 
-    def __init__(self, library: Layer, count: int) -> None:
+    def __init__(
+        self, library: Layer, count: int, spans: tuple[np.ndarray, np.ndarray] | None = None
+    ) -> None:
+        """spans: see :class:`~kumite.synthesis.Cast`."""
         self.library = library
         self.fps = library.clips.fps
         self.body = lay_body(library.clips.skeleton)
         self.shapes = self._lay_shapes()
-        self.cast = Cast(library, count)
+        self.cast = Cast(library, count, spans)
         self.opponent = np.full(count, NOBODY, dtype=np.int64)
         buckets = 1 << max(3, int(2 * count - 1).bit_length())
         self.grid = near.Hash(

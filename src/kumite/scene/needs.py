@@ -19,10 +19,15 @@ class Needs:
     style: str  # of the built-in performer, who stands in for a library
     motions: tuple[str, ...]  # kinds of motion, or targets by label, that the library must hold
     attackers: str | None = None  # the library of those who attack: a style, or a file
+    layers: tuple[str, ...] = ()  # all that are needed, the first of them first
     physics: str = "no"  # 'no', 'if installed' or 'yes': MuJoCo moves bodies that are struck
 
+    def __post_init__(self) -> None:
+        if not self.layers:
+            object.__setattr__(self, "layers", (self.level,))
+
     def to_json(self) -> dict[str, Any]:
-        return {**asdict(self), "motions": list(self.motions)}
+        return {**asdict(self), "motions": list(self.motions), "layers": list(self.layers)}
 
 
 def needs(settings: SceneSettings) -> Needs:
@@ -40,5 +45,8 @@ def needs(settings: SceneSettings) -> Needs:
         bout = settings.bout or BoutSettings()
         physics = {"kinematic": "no", "auto": "if installed", "physical": "yes"}[bout.reactions]
         motions = ("steps",) if bout.library == "locomotion" else ("blows", "steps", "defences")
-        return Needs("actions", bout.library, motions, physics=physics)
+        if not settings.avoiding:
+            return Needs("actions", bout.library, motions, physics=physics)
+        layers = ("actions", "avoidance")
+        return Needs("actions", bout.library, (*motions, "avoidance"), None, layers, physics)
     return Needs("frames", "boxing", ("blows", "steps"))

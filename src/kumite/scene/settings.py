@@ -162,6 +162,12 @@ class SceneSettings(Settings):
         return self.dodger + (self.dodgers.dodgers() if self.dodgers else ())
 
     @cached_property
+    def avoiding(self) -> tuple[str, ...]:
+        """The names of all who avoid what comes at them."""
+        fighters = (f.name for f in self.fighters if "avoid" in f.controllers)
+        return (*(d.name for d in self.dodging), *fighters)
+
+    @cached_property
     def characters(self) -> tuple[CharacterSettings, ...]:
         """Those named one by one, then the crowd."""
         return self.character + (self.crowd.characters() if self.crowd else ())
@@ -197,8 +203,11 @@ class SceneSettings(Settings):
             if self.character or self.crowd or self.fighter or self.pairs or self.object:
                 raise ValueError("[[dodger]]s are among themselves; expected nobody else")
             return self._fit_dodgers()
-        if self.dodge or self.balls:
-            raise ValueError("[dodge] and [balls] are of [[dodger]]s; there are none")
+        if (self.dodge or self.balls) and not self.avoiding:
+            raise ValueError(
+                "[dodge] and [balls] are of those who avoid; expected [[dodger]]s, or "
+                '[[fighter]]s with controllers = ["avoid", "fight"]'
+            )
         if self.fighter or self.pairs:
             if self.character or self.crowd or self.object:
                 raise ValueError("[[fighter]]s fight among themselves; expected nobody else")

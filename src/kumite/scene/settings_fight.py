@@ -110,8 +110,19 @@ class FighterSettings(Manner):
     position: tuple[Metres, Metres]  # m, x and z
     yaw_deg: Finite = 0.0  # 0 faces +Z
     against: Name  # another fighter, or "nearest": of those who are after it
+    # Who decides, by priority: the first that has something to say is heard.
+    controllers: Annotated[tuple[Literal["avoid", "fight"], ...], Field(min_length=1)] = ("fight",)
     point: tuple[CheckPointSettings, ...] = ()
     path: PathSettings | None = None  # before the points
+
+    @model_validator(mode="after")
+    def _controllers_are_all(self) -> FighterSettings:
+        if self.controllers[-1] != "fight" or len(set(self.controllers)) < len(self.controllers):
+            raise ValueError(
+                f"controllers = {list(self.controllers)}; expected each once, and last "
+                '"fight", which always has something to say'
+            )
+        return self
 
     @model_validator(mode="after")
     def _route_is_one(self) -> FighterSettings:
@@ -131,7 +142,7 @@ class FighterSettings(Manner):
 class BoutSettings(Settings):
     """What a fight goes by."""
 
-    library: Literal["boxing", "sword", "locomotion"] = "boxing"  # of the built-in performer
+    library: Literal["boxing", "sword", "locomotion", "all"] = "boxing"  # of the built-in performer
     facing_deg: Positive = 60.0  # from the opponent at the end of an action, at most
     attack_range: Positive = 1.0  # m
     defence_range: Positive = 3.0  # m

@@ -35,8 +35,13 @@ BLOW_BEFORE, BLOW_AFTER = 0.07, 0.12  # s around the effective frames in which a
 class Cast:
     """K characters. Arrays named as in ``kernels/character.py``; each frame overwrites the last."""
 
-    def __init__(self, library: Layer, count: int) -> None:
+    def __init__(
+        self, library: Layer, count: int, spans: tuple[np.ndarray, np.ndarray] | None = None
+    ) -> None:
+        """spans: the first and the last library frames of what may be begun, [S] int32 each; None:
+        the stretches of the layer."""
         self.library = library
+        first, last = spans or (library.table.first, library.table.last)
         clips, skeleton = library.clips, library.clips.skeleton
         joints = len(skeleton)
         self.count = count
@@ -78,8 +83,8 @@ class Cast:
             self.stop,
             self.anchor,
             self.jump,
-            library.table.first,
-            library.table.last,
+            first,
+            last,
             blow_windows(library),
             self.held,
             SPRINGS,

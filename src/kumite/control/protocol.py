@@ -1,0 +1,71 @@
+"""What decides for a character: controllers, in order of priority.
+
+A character has a list of controllers. Each sees every frame (:meth:`Controller.watch`), and may ask
+that the action that is played be broken off. Where an action ends they are asked in order, and the
+first that has something to say is heard (:meth:`Controller.choose`). No controller knows of the
+others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from kumite.graph.spans import Spans
+from kumite.synthesis import Cast
+
+PASS = -1  # chosen by a controller that leaves it to the next
+
+
+@dataclass(frozen=True)
+class View:
+    """What the controllers of one character may know in a frame. Arrays are read only."""
+
+    me: int  # which character it is
+    frame: int  # since the start
+    fps: float
+    names: tuple[str, ...]  # of all K characters
+    opponent: np.ndarray  # [K] whom each minds
+    cast: Cast  # who is where, and what each plays
+    spans: Spans  # what may be chosen
+    free: bool  # neither moved by physics nor in a reaction: it may break off what it does
+
+    @property
+    def seconds(self) -> float:
+        """Since the start."""
+        return self.frame / self.fps
+
+    @property
+    def place(self) -> np.ndarray:
+        """Where all are on the floor [K, 2] m."""
+        return self.cast.root_position[:, [0, 2]]
+
+
+class Controller(Protocol):
+    """Something that decides for a character."""
+
+    name: str
+
+    def start(self) -> None:
+        """A scene begins, or begins again."""
+        ...
+
+    def watch(self, view: View) -> int | None:
+        """See a frame, before anybody moves. The library frame, ahead in what is played, at which
+        it is to be broken off, for this controller to choose; None: it may go on."""
+        ...
+
+    def choose(self, view: View) -> int:
+        """The span of :attr:`View.spans` to begin where an action has ended, or PASS."""
+        ...
+
+    def rate(self, view: View) -> float:
+        """Library frames for each shown frame while what it chose is played, or until it is broken
+        off for it."""
+        ...
+
+    def interrupted(self, view: View) -> None:
+        """What it chose has been cut short: the character was struck."""
+        ...
