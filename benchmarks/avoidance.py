@@ -31,9 +31,10 @@ from kumite.kernels import avoid as kernels
 from kumite.rotation import planar_apply
 from kumite.scene import load_scene
 from kumite.scene.balls import aimed
-from kumite.scene.dodge import AIM_SPREAD, DodgeScene
+from kumite.scene.dodge import DodgeScene
 from kumite.scene.events import Struck, Throw
 from kumite.scene.settings_dodge import BallsSettings, DodgersSettings, DodgeSettings
+from kumite.scene.throwing import AIM_SPREAD
 
 SEED = 20110
 THROWS, FEW_THROWS = 1000, 60

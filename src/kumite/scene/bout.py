@@ -109,7 +109,7 @@ class BoutScene:
         if settings.avoiding:
             self._equip(layers)
         self.controllers: list[list[Controller]] = [
-            [self._avoiders[k] if c == "avoid" else Fight(self) for c in f.controllers]
+            [self._avoiders[k] if c == "avoid" else TreeFighter(self) for c in f.controllers]
             for k, f in enumerate(settings.fighters)
         ]
         self._edge: list[SceneObject] = []
@@ -304,7 +304,7 @@ class BoutScene:
         """Controllers see the frame and choose where an action ends, before anybody moves."""
         cast = self.cast
         for k, controllers in enumerate(self.controllers):
-            if len(controllers) == 1 and isinstance(controllers[0], Fight):
+            if len(controllers) == 1 and isinstance(controllers[0], TreeFighter):
                 continue  # it sees what it needs when it chooses
             view = self.view(k)
             for n, controller in enumerate(controllers):
@@ -318,13 +318,32 @@ class BoutScene:
             waiting = [k for k in cast.waiting.tolist() if not self._lies(k)]
             if not waiting:
                 break
-            for k, (n, span) in [(k, self._chosen(k)) for k in waiting]:
+            for k in waiting:
+                n, span = self._chosen(k)
                 self._charge[k] = n
                 self._begin(k, span)
+                self._tell_choice(k, span)
                 if len(self.controllers[k]) > 1:
                     cast.set_rate(k, self._rate(k, self.view(k)))
         for k in cast.waiting.tolist():
             cast.wait(k)
+
+    def _tell_choice(self, k: int, span: int) -> None:
+        """Tell what a controller has chosen; the tree has told more of it."""
+        controller = self.controllers[k][self._charge[k]]
+        if isinstance(controller, TreeFighter):
+            return
+        layer, stretch = self.spans.stretch(span)
+        self.events.append(
+            events.Decision(
+                self.frame,
+                self.names[k],
+                by=controller.name,
+                stretch=stretch,
+                action=self.tree.labels[stretch] if layer == "actions" else "",
+                jump=bool(self.cast.jump[k]),
+            )
+        )
 
     def _rate(self, k: int, view: View) -> float:
         rate = self.controllers[k][self._charge[k]].rate(view)
@@ -466,15 +485,6 @@ class BoutScene:
         self._elsewhere[k] = True
         self.stretch[k] = self._like[self.spans.last[span]]  # it goes on as after that
         self._landed[k] = NO_BLOW
-        self.events.append(
-            events.Decision(
-                self.frame,
-                self.names[k],
-                by=self.controllers[k][self._charge[k]].name,
-                stretch=stretch,
-                jump=bool(self.cast.jump[k]),
-            )
-        )
 
     def _does(self, k: int, stretch: int) -> None:
         """Character k is in a stretch from now on."""
@@ -609,10 +619,10 @@ class BoutScene:
                 self._told[k] = m.index + 1
 
 
-class Fight:
+class TreeFighter:
     """The controller of a fighter that looks ahead by game tree. It always has something to do."""
 
-    name = "fight"
+    name = "tree"
 
     def __init__(self, scene: BoutScene) -> None:
         self._scene = scene

@@ -176,8 +176,8 @@ class Decision(Event):
     dropped: ClassVar[frozenset[str]] = frozenset({"frames"})
     lacking: ClassVar[Mapping[str, Any]] = {"jump": False}
 
-    by: str  # the controller: policy, tree, avoid or prepare
-    stretch: int  # of the library's action table: what it does
+    by: str  # the controller: policy, tree, avoid, prepare, or the name of one's own
+    stretch: int  # of the action table that the controller plans on: what it does
     jump: bool  # it begins with a join: it is not what follows in the capture
     action: str = ""  # its label, where actions have labels
     considered: int | None = None  # ways to go on that were looked at, at all depths
