@@ -50,7 +50,7 @@ def _left_alone(scene: BoutScene, monkeypatch: pytest.MonkeyPatch) -> None:
     """From now on nobody strikes, chooses or pushes."""
     monkeypatch.setattr(bout, "push_apart", lambda floor: None)
     monkeypatch.setattr(scene, "_land", lambda landing: None)
-    monkeypatch.setattr(scene, "_choose", lambda k: scene._begin(k, int(scene.stretch[k])))
+    monkeypatch.setattr(scene, "choose_by_tree", lambda k: int(scene.stretch[k]))
     scene.floor.room = scene.floor.room._replace(most=0.0)
 
 
@@ -128,7 +128,7 @@ def test_the_moment_is_smooth_and_the_response_follows(
 def test_the_tree_expects_a_struck_fighter_where_it_comes_to(
     actions: Layer, physics: None, monkeypatch: pytest.MonkeyPatch
 ):
-    """What `_choose` tells the tree of the victim is true in and after the moment, to the end."""
+    """What the tree is told of the victim is true in and after the moment, to the end."""
     scene = _fight(actions, "physical", seed=2)
     k = _until_hit(scene)
     table, tree, cast = actions.table, scene.tree, scene.cast
