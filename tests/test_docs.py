@@ -15,7 +15,7 @@ from typer.main import get_command
 
 import kumite
 import kumite.graph
-from kumite.cli.app import app
+from kumite.cli.start import app
 from tests.shared import builtin
 
 ROOT = Path(__file__).parents[1]
