@@ -92,7 +92,9 @@ def test_motions_that_cannot_be(library: Layer, fighters: Layer):
         approach_motions(library, gaits=("stand",))
     with pytest.raises(KumiteError, match="holds no target motions; expected one for preparation"):
         approach_motions(fighters)
-    for wrong in ((), (2.0,), (float("nan"),)):
+    with pytest.raises(KumiteError, match="expected several, each a number, none of them NaN"):
+        approach_motions(library, steer=(float("nan"),))
+    for wrong in ((), (2.0,)):
         with pytest.raises(KumiteError, match=r"expected extra turns of at most 1\.6 rad"):
             approach_motions(library, steer=wrong)
     with pytest.raises(KumiteError, match="expected each turn once"):
@@ -169,7 +171,7 @@ def test_train_is_refused(run, fighters, library, tmp_path: Path):
     save_library(tmp_path / "f.kumite", fighters)
     save_library(tmp_path / "p.kumite", library)
     for arguments, text in (
-        (("f.kumite",), "holds no target motions"),
+        (("f.kumite",), "the library has no layer 'preparation'"),
         (("none.kumite",), "none.kumite"),
         (("p.kumite", "--steer", 0), "the goal cannot be reached from"),
         (("p.kumite", "--steer", 200), "at most 1.6 rad"),

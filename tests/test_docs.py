@@ -53,6 +53,7 @@ def test_examples_run(example: str, here: Path, capsys: pytest.CaptureFixture[st
     [
         "README.md",
         "docs/avoidance.md",
+        "docs/controllers.md",
         "docs/events.md",
         "docs/performer.md",
         "docs/preparation.md",

@@ -444,7 +444,7 @@ def spoiled(**changes) -> Motions:
         (lambda: spoiled(names=("stand",) * 7), "different"),
         (lambda: spoiled(displacement=np.zeros((7, 3))), r"expected \(7, levels, 3\)"),
         (lambda: spoiled(displacement=np.zeros((6, 5, 3))), r"expected \(7, levels, 3\)"),
-        (lambda: spoiled(displacement="far"), "no array of numbers"),
+        (lambda: spoiled(displacement="far"), "displacement: 'far'; expected an array of numbers"),
         (lambda: spoiled(displacement=np.full((7, 5, 3), np.nan)), "must be finite"),
         (lambda: spoiled(duration=np.ones(6)), r"duration \(6,\), expected \(7,\)"),
         (lambda: spoiled(duration=np.zeros(7)), "more than 0 s"),

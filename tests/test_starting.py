@@ -195,7 +195,8 @@ def test_with_no_output_at_all_it_runs(tmp_path: Path):
 @pytest.mark.parametrize("module", ["typer", "kumite.cli.scenes", "pydantic", "numba"])
 def test_ctrl_c_while_it_imports_ends_it_without_a_traceback(tmp_path: Path, module: str):
     program = f"""
-import sys
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background it is ignored
 class Interrupt:
     def find_spec(self, name, path=None, target=None):
         if name == {module!r}:

@@ -55,7 +55,7 @@ def test_it_plays_over_and_over(whole: Layer):
 
 
 def test_only_actions_of_an_action_level_library(whole: Layer, library: Layer):
-    with pytest.raises(KumiteError, match="--level actions"):
+    with pytest.raises(KumiteError, match="--layer actions"):
         ActionPlayback(library)
     with pytest.raises(KumiteError, match=r"action 9999; expected 0 to \d+"):
         ActionPlayback(whole).choose(9999)

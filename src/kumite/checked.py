@@ -61,7 +61,8 @@ def _checked(function: Any, name: str) -> Any:
             kind = kinds.get(place)
             if kind is not None and not kind.fits(value):
                 what = shown(value) if isinstance(value, str | float | int) else a(value)
-                raise KumiteError(f"{name}: {place}: {what}; expected {kind.name}")
+                nan = ", none of them NaN" if _holds_nan(value) else ""
+                raise KumiteError(f"{name}: {place}: {what}; expected {kind.name}{nan}")
         return function(*args, **given)
 
     return call
@@ -143,6 +144,12 @@ def _rows(origin: Any, args: tuple[Any, ...]) -> _Kind:
     if length is not None:
         return _Kind(fits, f"{length} values ({', '.join(names)})", of_numbers)
     return _Kind(fits, f"several, each {names[0]}", of_numbers)
+
+
+def _holds_nan(value: Any) -> bool:
+    """Whether it is NaN, or a list or tuple of which a value is."""
+    values = value if isinstance(value, list | tuple) else (value,)
+    return any(isinstance(v, float) and v != v for v in values)
 
 
 def _is_number(value: Any) -> bool:
