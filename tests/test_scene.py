@@ -618,6 +618,28 @@ def test_two_of_one_clip_do_not_move_in_step():
         assert any(isinstance(e, Hit) for e in scene.events), seed
 
 
+def test_an_unknown_key_deep_in_a_scene_names_those_it_may_have(tmp_path: Path):
+    """A list that may be left out, in a table of a list: found by fuzzing."""
+    text = """title = "x"
+[[fighter]]
+name = "a"
+position = [0, 0]
+against = "b"
+[[fighter]]
+name = "b"
+position = [0, 1]
+against = "a"
+[[cue]]
+who = "a"
+at = 1.0
+[[cue.point]]
+palce = [0.0, 4.0]
+"""
+    (tmp_path / "x.toml").write_text(text, "utf-8")
+    with pytest.raises(KumiteError, match="unknown key .*palce.*expected one of .*place"):
+        load_scene(str(tmp_path / "x.toml"))
+
+
 def test_who_chooses_at_the_same_moment_does_not_choose_the_same(library: Layer):
     scene = LiveScene(load_scene("sparring"), library, seed=1)
     cast = scene.cast

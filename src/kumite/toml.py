@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_origin
+from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
@@ -84,17 +84,21 @@ def _shown(value: Any) -> str:
 
 def _keys(model: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:
     """The keys that the table at a place may hold."""
-    inside: Any = model
-    for part in place:
-        if isinstance(inside, type) and issubclass(inside, BaseModel):
-            inside = inside.model_fields[str(part)].annotation
-        else:  # an entry of a list or a table of tables
-            inside = next(a for a in reversed(get_args(inside)) if a is not Ellipsis)
-        if get_origin(inside) not in (dict, tuple, list):
-            models = [a for a in get_args(inside) if isinstance(a, type)]
-            inside = next((m for m in models if issubclass(m, BaseModel)), inside)
-    fields = inside.model_fields
-    return sorted(k for k, f in fields.items() if f.annotation is not type(None))
+    found = [model]
+    for part in place:  # a number, or a name that is nobody's field, is an entry of several
+        fields = [m.model_fields[str(part)] for m in found if str(part) in m.model_fields]
+        if fields:
+            found = [m for field in fields for m in _models(field.annotation)]
+    return sorted(
+        {k for m in found for k, f in m.model_fields.items() if f.annotation is not type(None)}
+    )
+
+
+def _models(hint: Any) -> list[type[BaseModel]]:
+    """The tables that a hint speaks of, however deep within it."""
+    if isinstance(hint, type) and issubclass(hint, BaseModel):
+        return [hint]
+    return [model for part in get_args(hint) for model in _models(part)]
 
 
 def line_of(source: str, *place: int | str) -> int | None:
