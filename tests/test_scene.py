@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -636,7 +637,7 @@ at = 1.0
 palce = [0.0, 4.0]
 """
     (tmp_path / "x.toml").write_text(text, "utf-8")
-    with pytest.raises(KumiteError, match="unknown key .*palce.*expected one of .*place"):
+    with pytest.raises(KumiteError, match=r"unknown key .*palce.*expected one of .*place"):
         load_scene(str(tmp_path / "x.toml"))
 
 
