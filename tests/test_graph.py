@@ -166,6 +166,28 @@ def test_a_library_whose_numbers_point_nowhere_is_damaged(
         load_library(tmp_path / "b.kumite")
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("left_out", 3),
+        ("left_out", {"why": "x"}),
+        ("left_out", {"why": None}),
+        ("joins_over_bound", [1]),
+        ("targets_over_bound", 7),
+        ("targets_over_bound", [1.5]),
+        ("mean_join_cost", "low"),
+    ],
+)
+def test_a_report_that_says_no_such_thing_is_damaged(library: Layer, tmp_path, name, value):
+    """Reports are shown, and counted with: found by fuzzing."""
+    save_library(tmp_path / "a.kumite", library)
+    header, arrays = files.load(tmp_path / "a.kumite", "library", VERSION)
+    header["layers"]["frames"]["report"][name] = value
+    files.save(tmp_path / "b.kumite", "library", VERSION, header, arrays)
+    with pytest.raises(KumiteError, match=f"b.kumite: damaged library .*report: {name}"):
+        load_library(tmp_path / "b.kumite")
+
+
 def test_notes_that_do_not_fit_the_clips_are_refused(library: Layer):
     fewer = Contacts(library.contacts.on_ground[1:], library.contacts.resting_height)
     with pytest.raises(KumiteError, match=r"contacts of \d+ frames, clips of"):

@@ -21,7 +21,9 @@ def test_the_table_of_known_kernels_names_kernels_and_types():
         assert len(read_types(row.types)) == count, row.name
 
 
-@pytest.mark.parametrize("name", ["sparring", "boxing", "dodgeball", "slip", "ball-kick", "under-fire"])
+@pytest.mark.parametrize(
+    "name", ["sparring", "boxing", "dodgeball", "slip", "ball-kick", "under-fire"]
+)
 def test_scenes_call_known_kernels_only(name: str):
     settings = load_scene(name)
     scenes._live_scene(settings, None, 0)  # the library is made, where it is not there yet

@@ -37,10 +37,26 @@ from kumite.graph.transitions import (
     strongest_component,
 )
 
+
+def _shares(value: object, what: str) -> None:
+    """Errors: anything but counts of frames by the reason why."""
+    for reason, count in mapping(value, what).items():
+        whole(count, f"{what}: {reason}", least=0)
+
+
+def _labels(value: object, what: str) -> None:
+    """Errors: anything but a list of labels."""
+    for label in instance(value, (list, tuple), what):
+        text(label, f"{what}: a label")
+
+
 _REPORTED = {
     **dict.fromkeys(("event", "level"), text),
     **dict.fromkeys(("every", "threshold", "mean_join_cost", "mean_action_s", "alike"), number),
     **dict.fromkeys(("transitions", "candidates", "frames_kept", "hits_kept", "nodes"), whole),
+    "joins_over_bound": whole,
+    "left_out": _shares,
+    "targets_over_bound": _labels,
 }  # what a report's values must be, where readers count on it
 
 _NO_PARTS = no_avoidance(np.zeros(1, np.int64))  # of clips that are not known yet
