@@ -221,7 +221,7 @@ def build(
     *,
     reading: Reading,
 ) -> None:
-    """Build a library: clips, contacts, effective hits and the motion graph, in one file."""
+    """Build a library: clips, contacts, effective hits and the motion graphs, in one file."""
     from kumite.files import refuse_unwritable
 
     if most is not None and actions is not None:

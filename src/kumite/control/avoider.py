@@ -53,8 +53,8 @@ class Avoider:
         tell: Callable[[Avoidance, Threat], None],
     ) -> None:
         """search: of a library's avoidance layer. away [F] rad: how far each frame is from where
-        the other controllers could go on. strikes: the blows that it goes through with. tell: is
-        told what each search comes to."""
+        the other controllers could go on. strikes: blows, which are not broken off once they are
+        driven home. tell: is told what each search comes to."""
         self.search, self.tell, self._away = search, tell, away
         self._enter = entries(search.library)
         self._strikes = np.zeros(len(away), dtype=bool)
@@ -94,7 +94,7 @@ class Avoider:
             return frame
         ahead = frame + int(cast.fraction[k] > 0.0)
         if self._strikes[frame]:
-            return None  # whoever has begun to strike goes through with it
+            return None  # a blow that is driven home is not broken off
         state = int(self._enter[ahead]) if ahead < len(self._enter) else NO_STATE
         comes_past = state != NO_STATE and state <= cast.stop[k]
         soon = comes_past and state - frame <= SOON * view.fps
