@@ -411,18 +411,17 @@ def test_clicks_and_keys_lead_a_walker(make: Make):
         page.mouse.click(*spot(ball))
         assert wait(lambda: stage.thing[0] == 0)
         place = np.array([1.5, 0.0, -1.0])
+
+        def drawn() -> np.ndarray:
+            return browser.around(browser.picture(page), spot(place), 12)
+
+        bare = drawn()
         page.mouse.click(*spot(place))
         assert wait(lambda: np.isfinite(stage.told[0, 0]))
         assert np.allclose(stage.told[0], place[[0, 2]], atol=0.05)
-
-        before = browser.picture(page)
+        browser.wait_until(page, lambda: bool(np.any(drawn() != bare)), "the goal to be drawn")
         page.get_by_label("Goal", exact=True).click()
-        browser.wait_until(
-            page,
-            lambda: bool(np.any(browser.around(browser.picture(page), spot(place), 12)
-                                != browser.around(before, spot(place), 12))),
-            "the goal to be hidden",
-        )  # fmt: skip
+        browser.wait_until(page, lambda: bool(np.all(drawn() == bare)), "the goal to be hidden")
         page.get_by_label("Goal", exact=True).click()
 
         studio.toggle()
