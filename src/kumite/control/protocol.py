@@ -44,7 +44,11 @@ class View:
 
 
 class Controller(Protocol):
-    """Something that decides for a character."""
+    """Something that decides for a character.
+
+    It may have an attribute ``watches``: False while it has nothing to see. A character none of
+    whose controllers watches costs nothing until its action ends.
+    """
 
     name: str
 

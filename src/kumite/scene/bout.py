@@ -17,6 +17,7 @@ from kumite.clip import LIMBS
 from kumite.control import Progress, Route, style
 from kumite.control.avoidance import Avoidance, AvoidanceSearch, Outcome
 from kumite.control.avoider import Avoider, Threat
+from kumite.control.conductor import Conductor
 from kumite.control.game_tree import (
     CALM,
     GOAL_EVERY,
@@ -27,7 +28,7 @@ from kumite.control.game_tree import (
     Others,
     Player,
 )
-from kumite.control.protocol import PASS, Controller, View
+from kumite.control.protocol import Controller, View
 from kumite.errors import KumiteError, unknown
 from kumite.graph import Layer, Library
 from kumite.graph.spans import Spans, nearest
@@ -63,11 +64,9 @@ from kumite.scene.settings_fight import CHANGES, BoutSettings, CueSettings
 from kumite.scene.stage import SceneObject
 from kumite.scene.story import Story
 from kumite.scene.throwing import Throwing
-from kumite.synthesis.rates import FASTEST, SLOWEST
 
 NEAR = 6.0  # m within which others are minded
 FREE = 1.5  # times the distance of a catch: so far one has got away
-MOST_AT_ONCE = 8  # spans that one may begin in one frame
 GOALS = 25  # places ahead of which a fighter knows: 6 s
 
 
@@ -208,7 +207,6 @@ class BoutScene:
         self._done: list[set[str]] = [set() for _ in range(count)]
         self._told = [0] * count  # check points before this one have been told if missed
         self._elsewhere = np.zeros(count, dtype=bool)  # in a span of another layer than its stretch
-        self._charge = [0] * count  # which of its controllers chose what it does
         self._caught = np.zeros(count, dtype=bool)
         self._landed = [NO_BLOW] * count  # the blow each has landed last in what it is doing
         bout = self.bout
@@ -222,9 +220,17 @@ class BoutScene:
         for k in np.flatnonzero(self._nearest).tolist():
             self._turn_to_nearest(k)
         self.reactions.start(self.floor)
-        for controllers in self.controllers:
-            for controller in controllers:
-                controller.start()
+        self.conductor = Conductor(
+            cast,
+            self.spans,
+            self.names,
+            self.floor.opponent,
+            self.controllers,
+            begin=self._take,
+            free=self._free,
+            chooses=lambda k: not self._lies(k),
+        )
+        self.conductor.start()
         if self._avoiders:
             self._throwing = Throwing(
                 self.settings.balls or BallsSettings(),
@@ -260,7 +266,7 @@ class BoutScene:
         self.story.step(self, self.frame / self.fps)
         if self._throwing is not None:
             self._throwing.due(self.frame)
-        self._control()
+        self.conductor.step(self.frame)
         happened = self.reactions.advance()
         if len(self.names) <= MOST_PHYSICAL:  # among many trunks are kept apart, limbs are not
             push_apart(self.floor)
@@ -291,48 +297,16 @@ class BoutScene:
 
     # Deciding ------------------------------------------------------------------------------------
 
-    def view(self, k: int) -> View:
-        """What the controllers of character k may know now."""
-        free = not (self.cast.held[k] or self._lies(k) or self._reacts(k))
-        opponent = self.floor.opponent
-        return View(k, self.frame, self.fps, self.names, opponent, self.cast, self.spans, free)
+    def _free(self, k: int) -> bool:
+        """Whether character k may break off what it does."""
+        reacts = not self._elsewhere[k] and self.tree.kinds[self.stretch[k]] == "reaction"
+        return not (self.cast.held[k] or self._lies(k) or reacts)
 
-    def _reacts(self, k: int) -> bool:
-        return not self._elsewhere[k] and self.tree.kinds[self.stretch[k]] == "reaction"
-
-    def _control(self) -> None:
-        """Controllers see the frame and choose where an action ends, before anybody moves."""
-        cast = self.cast
-        for k, controllers in enumerate(self.controllers):
-            if len(controllers) == 1 and isinstance(controllers[0], TreeFighter):
-                continue  # it sees what it needs when it chooses
-            view = self.view(k)
-            for n, controller in enumerate(controllers):
-                leave = controller.watch(view)
-                # Whoever comes after the one that is heard now has to wait for the action's end.
-                if leave is not None and n <= self._charge[k]:
-                    cast.stop[k], self._charge[k] = leave, n
-                    break
-            cast.set_rate(k, self._rate(k, view))
-        for _ in range(MOST_AT_ONCE):  # again where a span is shorter than a quick frame
-            waiting = [k for k in cast.waiting.tolist() if not self._lies(k)]
-            if not waiting:
-                break
-            for k in waiting:
-                n, span = self._chosen(k)
-                self._charge[k] = n
-                self._begin(k, span)
-                self._tell_choice(k, span)
-                if len(self.controllers[k]) > 1:
-                    cast.set_rate(k, self._rate(k, self.view(k)))
-        for k in cast.waiting.tolist():
-            cast.wait(k)
-
-    def _tell_choice(self, k: int, span: int) -> None:
-        """Tell what a controller has chosen; the tree has told more of it."""
-        controller = self.controllers[k][self._charge[k]]
+    def _take(self, k: int, span: int, controller: Controller) -> None:
+        """Character k begins a span that one of its controllers has chosen."""
+        self._begin(k, span)
         if isinstance(controller, TreeFighter):
-            return
+            return  # it has told more of it
         layer, stretch = self.spans.stretch(span)
         self.events.append(
             events.Decision(
@@ -344,19 +318,6 @@ class BoutScene:
                 jump=bool(self.cast.jump[k]),
             )
         )
-
-    def _rate(self, k: int, view: View) -> float:
-        rate = self.controllers[k][self._charge[k]].rate(view)
-        return float(np.clip(rate, SLOWEST, FASTEST))
-
-    def _chosen(self, k: int) -> tuple[int, int]:
-        """Which controller of character k is heard, and the span it chooses."""
-        view = self.view(k)
-        for n, controller in enumerate(self.controllers[k]):
-            span = controller.choose(view)
-            if span != PASS:
-                return n, int(span)
-        raise KumiteError(f"{self.names[k]}: no controller has chosen an action; expected one")
 
     def choose_by_tree(self, k: int) -> int:
         """What character k does next, as its game tree says: a stretch."""
@@ -520,15 +481,8 @@ class BoutScene:
             return
         begin = self._does if reaction.begun else self._begin
         begin(landing.victim, reaction.stretch)
-        self._interrupt(landing.victim)
+        self.conductor.interrupt(landing.victim)
         self.events.append(reaction.told(self.frame, self.names[landing.victim]))
-
-    def _interrupt(self, k: int) -> None:
-        """What character k did has been cut short; the last of its controllers goes on."""
-        view = self.view(k)
-        for controller in self.controllers[k]:
-            controller.interrupted(view)
-        self._charge[k] = len(self.controllers[k]) - 1
 
     def _forget(self, number: int) -> None:
         """What was thrown is over."""
@@ -569,7 +523,7 @@ class BoutScene:
         if fall != NOTHING and not self._lies(k):
             self.reactions.forget(k)
             self._begin(k, fall)
-            self._interrupt(k)
+            self.conductor.interrupt(k)
 
     def drag(self, k: int, way: np.ndarray) -> None:
         """Character k is moved over the ground by way [2] m, feet and all."""
@@ -623,6 +577,7 @@ class TreeFighter:
     """The controller of a fighter that looks ahead by game tree. It always has something to do."""
 
     name = "tree"
+    watches = False  # it sees what it needs when it chooses
 
     def __init__(self, scene: BoutScene) -> None:
         self._scene = scene
