@@ -10,7 +10,7 @@ from pathlib import Path
 
 from kumite.control import cache_folder
 from kumite.graph import builtin_library, load_library
-from kumite.scene import BoutScene, load_scene
+from kumite.scene import World, load_scene
 from kumite.scene.events import Avoided, Hit, Struck, Throw
 
 NAMES = ("thrown", "struck", "avoided", "landed")
@@ -31,7 +31,7 @@ def main() -> None:
     total = {True: [0] * len(NAMES), False: [0] * len(NAMES)}
     for seed in given.seeds:
         for avoids in (True, False):
-            scene = BoutScene(load_scene("under-fire"), library, seed=seed)
+            scene = World(load_scene("under-fire"), library, seed=seed)
             if not avoids:
                 for controllers in scene.controllers:
                     del controllers[0]

@@ -19,7 +19,7 @@ from kumite import mocap
 from kumite.control import Route, cache_folder
 from kumite.control.styles import VULNERABILITY, short_range
 from kumite.graph import Layer, build_actions, builtin_layer
-from kumite.scene import BoutScene, SceneSettings, load_scene, with_count
+from kumite.scene import SceneSettings, World, load_scene, with_count
 from kumite.scene.events import Hit, Reaction, Strike
 
 FIRST_SEED = 200  # no settings were chosen with this one or those after it in view
@@ -96,10 +96,10 @@ def boxers() -> list[str]:
     return ["boxing", *([REAL] if os.environ.get("KUMITE_MOCAP") and real.is_dir() else [])]
 
 
-def stage(job: Job) -> BoutScene:
+def stage(job: Job) -> World:
     settings = job.settings
     assert settings.bout is not None
-    scene = BoutScene(settings, library(job.library or settings.bout.library), seed=job.seed)
+    scene = World(settings, library(job.library or settings.bout.library), seed=job.seed)
     for player, depth in zip(scene.players, job.depths):
         player.depth = depth
     return scene
@@ -138,7 +138,7 @@ def play(job: Job) -> Fight:
             damage[k] += e.speed * VULNERABILITY[at]
         elif isinstance(e, Reaction) and scene.tree.labels[e.stretch] == "fall":
             falls[k].append(e.frame / scene.fps)
-    down = np.array([scene.tree.labels[s] == "fall" for s in scene.stretch])
+    down = np.array([scene.tree.labels[s] == "fall" for s in scene.tree_fighter.stretch])
     nodes = sum(int(d.nodes.sum()) for d in scene.decisions)
     return Fight(
         scene.fps,

@@ -35,7 +35,7 @@ from fights import (
 )
 from flaws import COMBINATIONS, KEPT, NODES, PUT_UP, RULES
 
-from kumite.scene import BoutScene, load_scene
+from kumite.scene import World, load_scene
 
 PAPER_PRUNING = {"boxing": (120.0, 35.5), "sword": (94.3, 68.2), "locomotion": (95.8, 40.3)}
 FEW_SEEDS, SEEDS = 2, 10
@@ -124,7 +124,7 @@ def _best(work: Callable[[], Any], repeats: int) -> tuple[float, float, Any]:
     return min(found, key=lambda f: f[0])
 
 
-def _places(library: str, count: int) -> tuple[BoutScene, list]:
+def _places(library: str, count: int) -> tuple[World, list]:
     """A fight, and what was asked in decisions spread over 30 s of it."""
     scene, found = stage(Job("boxing", FIRST_SEED, library)), []
     decide = scene.tree.decide

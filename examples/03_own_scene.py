@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from kumite import LiveScene, builtin_layer, load_scene, record, save_recording
+from kumite import World, builtin_layer, load_scene, record, save_recording
 from kumite.scene.events import Hit
 
 Path("ring.toml").write_text(
@@ -28,7 +28,7 @@ aims_at = "ann"
 strike = 5.0
 """
 )
-scene = LiveScene(load_scene("ring.toml"), builtin_layer(None), seed=2)
+scene = World(load_scene("ring.toml"), builtin_layer(None), seed=2)
 fight = record(scene, seconds=20)
 for event in fight.events:
     if isinstance(event, Hit):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from kumite import LiveScene, builtin_layer, load_scene
+from kumite import World, builtin_layer, load_scene
 from kumite.control import Behaviour, Station, approach_grid, heading_grid
 
 grid = approach_grid()  # where the target may be: all round, 2 m
@@ -23,7 +23,7 @@ behaviours = {
         "be_there", heading_grid(), station=Station(heading=0.0, sigma=0.15, always=True)
     ),
 }
-scene = LiveScene(load_scene("target"), builtin_layer(None), behaviours=behaviours)
+scene = World(load_scene("target"), builtin_layer(None), behaviours=behaviours)
 weights = {control.behaviour: control for control in scene.controls}
 target = scene.objects[0].position
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from kumite import BoutScene, builtin_library, load_scene
+from kumite import World, builtin_library, load_scene
 from kumite.control.protocol import PASS, View
 
 SECONDS = 1.5  # for which it backs off
@@ -39,7 +39,7 @@ class BackOff:
 
 library = builtin_library(None, layers=("actions",))
 for careful in (False, True):
-    scene = BoutScene(load_scene("boxing"), library, seed=3)
+    scene = World(load_scene("boxing"), library, seed=3)
     if careful:
         for controllers in scene.controllers:
             controllers.insert(0, BackOff(library.layer("actions")))

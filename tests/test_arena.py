@@ -15,7 +15,7 @@ from kumite.errors import KumiteError
 from kumite.export.gltf import write_glb
 from kumite.export.sheet import recording_sheet
 from kumite.graph import Layer
-from kumite.scene import BoutScene, Playback, SceneSettings, load_scene, record
+from kumite.scene import Playback, SceneSettings, World, load_scene, record
 from kumite.scene.events import Reaction
 from tests.shared import builtin
 
@@ -38,7 +38,7 @@ def _settings(name: str, **bout) -> SceneSettings:
     return SceneSettings.model_validate(told)
 
 
-def _off(scene: BoutScene, seconds: float) -> np.ndarray:
+def _off(scene: World, seconds: float) -> np.ndarray:
     """How far [F, K] everyone is from the middle while it runs."""
     out = []
     for _ in range(round(seconds * scene.fps)):
@@ -49,7 +49,7 @@ def _off(scene: BoutScene, seconds: float) -> np.ndarray:
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_chase_stays_inside_and_nobody_had_to_break_the_rule(running: Layer, seed: int):
-    scene = BoutScene(load_scene("chase"), running, seed=seed)
+    scene = World(load_scene("chase"), running, seed=seed)
     scene.players[0].depth = 2
     arena = scene.tree.rules.arena
     assert arena > 0.0
@@ -60,7 +60,7 @@ def test_a_chase_stays_inside_and_nobody_had_to_break_the_rule(running: Layer, s
 
 
 def test_boxers_stay_in_a_ring_however_hard_they_are_hit(boxing: Layer):
-    scene = BoutScene(_settings("boxing", arena=1.0, fall_from=7.0), boxing, seed=3)
+    scene = World(_settings("boxing", arena=1.0, fall_from=7.0), boxing, seed=3)
     off = _off(scene, 30.0)
     assert any(isinstance(e, Reaction) for e in scene.events)
     assert np.isfinite(off).all()
@@ -70,7 +70,7 @@ def test_boxers_stay_in_a_ring_however_hard_they_are_hit(boxing: Layer):
 
 @pytest.mark.parametrize("way", [(0.0, 6.0), (-5.0, -3.0)])
 def test_who_is_carried_outside_comes_back(running: Layer, way: tuple[float, float]):
-    scene = BoutScene(_settings("chase", scatter=0.0), running, seed=0)
+    scene = World(_settings("chase", scatter=0.0), running, seed=0)
     scene.players[0].depth = 2
     _off(scene, 1.0)
     scene.drag(0, np.array(way))
@@ -84,8 +84,8 @@ def test_who_is_carried_outside_comes_back(running: Layer, way: tuple[float, flo
 
 
 def test_an_arena_out_of_reach_makes_no_difference(boxing: Layer):
-    free = BoutScene(_settings("boxing"), boxing, seed=2)
-    wide = BoutScene(_settings("boxing", arena=900.0), boxing, seed=2)
+    free = World(_settings("boxing"), boxing, seed=2)
+    wide = World(_settings("boxing", arena=900.0), boxing, seed=2)
     for _ in range(300):
         free.step()
         wide.step()
@@ -96,7 +96,7 @@ def test_an_arena_out_of_reach_makes_no_difference(boxing: Layer):
 def test_any_number_of_threads_gives_the_same_chase(running: Layer):
     def chased(threads: int) -> tuple[bytes, list]:
         numba.set_num_threads(threads)
-        scene = BoutScene(load_scene("chase"), running, seed=5)
+        scene = World(load_scene("chase"), running, seed=5)
         _off(scene, 4.0)
         return scene.wxyz.tobytes(), scene.events
 
@@ -108,7 +108,7 @@ def test_any_number_of_threads_gives_the_same_chase(running: Layer):
 
 
 def test_its_edge_is_a_line_wherever_objects_are_shown(boxing: Layer, tmp_path: Path):
-    recording = record(BoutScene(_settings("boxing", arena=3.0), boxing), 0.5)
+    recording = record(World(_settings("boxing", arena=3.0), boxing), 0.5)
     (edge,) = Playback(recording).objects
     assert (edge.name, edge.line, edge.radius, edge.draggable) == ("arena", True, 3.0, False)
     assert np.allclose(edge.position, 0.0)

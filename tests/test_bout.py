@@ -11,7 +11,7 @@ from kumite.control.game_tree import GameTree, Player
 from kumite.errors import KumiteError
 from kumite.graph import Layer, build_actions
 from kumite.mocap import load
-from kumite.scene import BoutScene, SceneSettings, load_scene, measure, record
+from kumite.scene import SceneSettings, World, load_scene, measure, record
 from kumite.scene.events import CheckPointMissed, CheckPointReached, Decision, Hit, Reaction
 from tests.shared import builtin
 
@@ -22,15 +22,15 @@ def actions() -> Layer:
     return builtin(level="actions")
 
 
-def _fight(actions: Layer, **changes) -> BoutScene:
+def _fight(actions: Layer, **changes) -> World:
     """Boxing with one or the other fighter changed: red={…}, blue={…}."""
     settings = load_scene("boxing").model_dump(exclude_none=True)
     for fighter in settings["fighter"]:
         fighter.update(changes.get(fighter["name"], {}))
-    return BoutScene(SceneSettings.model_validate(settings), actions, seed=changes.get("seed", 0))
+    return World(SceneSettings.model_validate(settings), actions, seed=changes.get("seed", 0))
 
 
-def _run(scene: BoutScene, seconds: float) -> np.ndarray:
+def _run(scene: World, seconds: float) -> np.ndarray:
     """Distances [frames] between the first two while it runs."""
     out = []
     for _ in range(round(seconds * scene.fps)):
@@ -39,7 +39,7 @@ def _run(scene: BoutScene, seconds: float) -> np.ndarray:
     return np.array(out)
 
 
-def _landed(scene: BoutScene, name: str) -> int:
+def _landed(scene: World, name: str) -> int:
     return sum(isinstance(e, Hit) and e.character == name and not e.blocked for e in scene.events)
 
 
@@ -94,7 +94,7 @@ def test_who_has_waited_long_attacks_though_it_may_miss(actions: Layer):
 
 
 def test_the_same_seed_gives_the_same_fight(actions: Layer):
-    def fight(seed: int) -> BoutScene:
+    def fight(seed: int) -> World:
         scene = _fight(actions, seed=seed)
         _run(scene, 6.0)
         return scene
@@ -175,7 +175,7 @@ def test_two_share_a_check_point_by_the_middle_between_them(actions: Layer):
         point = {"place": tuple(middle), "time": 20.0, "radius": 0.2, "middle": shared}
         red = {"point": [point], "position": (0.3, 0.8)}
         scene = _fight(actions, red=red, blue={"point": [point], "position": (0.3, -0.6)})
-        goals = [scene._player(k).goal for k in range(2)]
+        goals = [scene.tree_fighter._player(k).goal for k in range(2)]
         place = scene.root_position[:, [0, 2]]
         for k, goal in enumerate(goals):
             assert goal is not None
@@ -188,8 +188,8 @@ def test_two_share_a_check_point_by_the_middle_between_them(actions: Layer):
 
 
 def test_wrong_fights_are_refused(actions: Layer, library: Layer):
-    with pytest.raises(KumiteError, match="one of frames; expected one of whole actions"):
-        BoutScene(load_scene("boxing"), library)
+    with pytest.raises(KumiteError, match="no layer 'actions'"):
+        World(load_scene("boxing"), library)
     with pytest.raises(KumiteError, match="no action is called 'flying_kick'"):
         _fight(actions, red={"wanted": ["flying_kick"]})
     with pytest.raises(KumiteError, match="A⁻ holds every action"):
@@ -212,7 +212,7 @@ def test_decisions_are_those_of_the_whole_tree(actions: Layer):
         _run(scene, 1.0)
         k = int(scene.cast.waiting[0]) if len(scene.cast.waiting) else 0
         state = tree.state(
-            (int(scene.stretch[k]), int(scene.stretch[1 - k])),
+            (int(scene.tree_fighter.stretch[k]), int(scene.tree_fighter.stretch[1 - k])),
             (-60.0, -30.0),
             (0.0, 20.0),
             (scene.cast.facing[k], scene.cast.facing[1 - k]),

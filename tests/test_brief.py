@@ -14,14 +14,14 @@ import pytest
 from PIL import Image
 
 from kumite.graph import Layer
-from kumite.scene import LiveScene, Recording, load_scene, record
+from kumite.scene import Recording, World, load_scene, record
 from tests import toys
 from tests.test_docs import PACKAGES
 
 
 @pytest.fixture(scope="module")
 def fight(library: Layer) -> Recording:
-    return record(LiveScene(load_scene("sparring"), library, seed=3), 4.0)
+    return record(World(load_scene("sparring"), library, seed=3), 4.0)
 
 
 def test_values_are_shown_in_two_lines_at_most(library: Layer, fight: Recording):

@@ -12,7 +12,7 @@ from kumite.clip import SIDES, forward_kinematics
 from kumite.graph import Layer
 from kumite.kernels import character as kernels
 from kumite.kernels import pose
-from kumite.scene.live import RECOIL
+from kumite.scene.reactions import RECOIL
 from kumite.synthesis import Cast
 from kumite.synthesis.cast import _below
 from kumite.synthesis.recoil import MOST_GIVEN

@@ -23,7 +23,7 @@ from kumite.graph import Layer, load_library, save_library
 from kumite.graph.library_file import VERSION
 from kumite.mocap import load
 from kumite.performer import STYLES, perform
-from kumite.scene import LiveScene, load_recording
+from kumite.scene import World, load_recording
 from tests import toys
 from tests.shared import only
 
@@ -558,14 +558,14 @@ def ctrl_c():
 @pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_keeps_what_ran(kumite, built: Path, monkeypatch, tmp_path: Path):
     """Once: the recording ends there and is written. Twice: nothing is."""
-    step, presses = LiveScene.step, []
+    step, presses = World.step, []
 
     def pressed(scene) -> bool:
         if scene.frame in presses:
             signal.raise_signal(signal.SIGINT)
         return step(scene)
 
-    monkeypatch.setattr(LiveScene, "step", pressed)
+    monkeypatch.setattr(World, "step", pressed)
     args = ("run", "sparring", "-l", built, "--seconds", "9000", "-o", "cut.rec")
     presses[:] = [60]
     status, text, err = kumite(*args)
@@ -573,7 +573,7 @@ def test_ctrl_c_keeps_what_ran(kumite, built: Path, monkeypatch, tmp_path: Path)
     cut = load_recording(tmp_path / "cut.rec")
     assert len(cut) == 62  # the frame in which it was pressed is kept
     (tmp_path / "cut.rec").unlink()
-    monkeypatch.setattr(LiveScene, "step", step)
+    monkeypatch.setattr(World, "step", step)
     kumite("run", "sparring", "-l", built, "--seconds", f"{62 / cut.fps}", "-o", "whole.rec")
     assert np.array_equal(load_recording(tmp_path / "whole.rec").wxyz, cut.wxyz)
     (tmp_path / "whole.rec").unlink()
@@ -584,7 +584,7 @@ def test_ctrl_c_keeps_what_ran(kumite, built: Path, monkeypatch, tmp_path: Path)
             signal.raise_signal(signal.SIGINT)
         return step(scene)
 
-    monkeypatch.setattr(LiveScene, "step", twice)
+    monkeypatch.setattr(World, "step", twice)
     status, text, err = kumite(*args)
     assert status == 130 and err.splitlines()[-1] == "interrupted" and "wrote" not in text
     assert not list(tmp_path.iterdir())

@@ -13,7 +13,7 @@ from kumite.errors import KumiteError
 from kumite.graph import Layer, Library, builtin_library, pose_features
 from kumite.graph.distance import squared_distances
 from kumite.graph.spans import NO_STATE, Spans, entries, nearest
-from kumite.scene import BoutScene, load_scene
+from kumite.scene import World, load_scene
 from kumite.scene.events import Avoided, Decision, Hit, Reaction, Struck
 
 LAYERS = ("actions", "avoidance")
@@ -24,7 +24,7 @@ def everything() -> Library:
     return builtin_library(caches.cache_folder(None), style="all", layers=LAYERS)
 
 
-def ran(scene: BoutScene, seconds: float) -> BoutScene:
+def ran(scene: World, seconds: float) -> World:
     for _ in range(round(seconds * scene.fps)):
         scene.step()
     return scene
@@ -67,7 +67,7 @@ def test_the_nearest_end_is_the_nearest(everything: Library):
 def test_who_avoids_first_is_struck_less_and_still_fights(everything: Library):
     """Of balls that are thrown at two who fight. Other seeds: 55 to 75 % are avoided, without
     avoiding 0 to 10 %; a third to two thirds as many blows land."""
-    scene = BoutScene(load_scene("under-fire"), everything)
+    scene = World(load_scene("under-fire"), everything)
     struck: dict[bool, int] = {}
     landed: dict[bool, int] = {}
     for avoids in (True, False):
@@ -90,7 +90,7 @@ def test_who_avoids_first_is_struck_less_and_still_fights(everything: Library):
 
 
 def test_the_same_seed_gives_the_same_frames(everything: Library):
-    scene = ran(BoutScene(load_scene("under-fire"), everything, seed=5), 8.0)
+    scene = ran(World(load_scene("under-fire"), everything, seed=5), 8.0)
     first = scene.wxyz.copy(), scene.root_position.copy(), list(scene.events)
     assert any(e.by == "avoid" for e in scene.events if isinstance(e, Decision))
     scene.reset(6)
@@ -129,7 +129,7 @@ class Stubborn:
 
 
 def test_a_controller_of_ones_own_is_heard_first(fighters: Layer):
-    scene = BoutScene(load_scene("boxing"), fighters, seed=2)
+    scene = World(load_scene("boxing"), fighters, seed=2)
     idle = scene.tree.kinds.index("idle")
     mine = Stubborn(scene.spans.span("actions", idle), until=3.0)
     scene.controllers[0].insert(0, mine)
@@ -147,10 +147,10 @@ def test_a_controller_of_ones_own_is_heard_first(fighters: Layer):
 def test_who_must_avoid_needs_both_layers(everything: Library, fighters: Layer):
     settings = load_scene("under-fire")
     with pytest.raises(KumiteError, match="needs the layers actions and avoidance"):
-        BoutScene(settings, fighters)
+        World(settings, fighters)
     with pytest.raises(KumiteError, match="no layer 'avoidance'"):
-        BoutScene(settings, Library.of(fighters))
-    with pytest.raises(ValueError, match="expected each once, and last"):
+        World(settings, Library.of(fighters))
+    with pytest.raises(ValueError, match="expected another behind"):
         settings.fighter[0].__class__.model_validate(
             {**settings.fighter[0].model_dump(), "controllers": ("fight", "avoid")}
         )

@@ -11,7 +11,15 @@ from kumite.errors import KumiteError
 from kumite.graph import Layer
 from kumite.kernels import crowd as kernels
 from kumite.kernels import near
-from kumite.scene import LiveScene, SceneSettings, live, load_scene, measure, record, with_count
+from kumite.scene import (
+    SceneSettings,
+    World,
+    load_scene,
+    measure,
+    policy_fighter,
+    record,
+    with_count,
+)
 from kumite.scene import memory as memory_module
 from kumite.scene.events import Strike
 from kumite.scene.pairs import pair_up
@@ -75,7 +83,7 @@ def test_everyone_has_an_opponent_and_pairs_are_mutual(seed, count):
 
 
 def test_thirty_boxers_fight_each_with_the_nearest(library: Layer):
-    scene = LiveScene(load_scene("crowd"), library, seed=1)
+    scene = World(load_scene("crowd"), library, seed=1)
     fight = record(scene, 20.0)
     found = measure(fight)
     assert len(found.characters) == 30
@@ -83,7 +91,7 @@ def test_thirty_boxers_fight_each_with_the_nearest(library: Layer):
     assert all(c.thrown > 0 for c in found.characters)
     assert found.min_separation_m is not None and found.min_separation_m > 0.25
     assert max(c.join_jump_m_s for c in found.characters) < 0.6
-    opponent = scene._actors.opponent
+    opponent = scene.floor.opponent
     assert np.array_equal(opponent[opponent], np.arange(30))
     # Nobody stands still: every one takes actions all the time.
     assert min(c.joins for c in found.characters) >= 3
@@ -93,8 +101,8 @@ def test_many_at_once_are_as_one_after_the_other(library: Layer, monkeypatch: py
     """The kernel on all cores gives the bytes of the one that is not."""
     frames = []
     for many in (2, 10**6):
-        monkeypatch.setattr(live, "MANY", many)
-        scene = LiveScene(with_count(load_scene("crowd"), 20), library, seed=3)
+        monkeypatch.setattr(policy_fighter, "MANY", many)
+        scene = World(with_count(load_scene("crowd"), 20), library, seed=3)
         for _ in range(60):
             scene.step()
         frames.append((scene.cast.frame.copy(), scene.wxyz.copy()))
@@ -108,10 +116,10 @@ def test_one_who_aims_at_the_nearest_among_named_ones_aims_at_another(library: L
         {"name": "b", "position": (0, 1.2), "aims_at": "a"},
         {"name": "third", "position": (0, 2.6), "aims_at": "nearest"},
     ]
-    scene = LiveScene(
+    scene = World(
         SceneSettings.model_validate({"title": "three", "character": characters}), library, seed=0
     )
-    assert scene._actors.opponent.tolist() == [1, 0, 1]
+    assert scene.floor.opponent.tolist() == [1, 0, 1]
     for _ in range(int(10 * scene.fps)):
         scene.step()
     assert any(isinstance(e, Strike) and e.character == "third" for e in scene.events)
@@ -124,7 +132,7 @@ def test_bodies_of_different_pairs_keep_apart(library: Layer):
         {"name": f"c{k}", "position": p, "yaw_deg": 180.0 * (k % 2), "aims_at": f"c{k ^ 1}"}
         for k, p in enumerate(corners)
     ]
-    scene = LiveScene(
+    scene = World(
         SceneSettings.model_validate({"title": "two pairs", "character": characters}),
         library,
         seed=0,
@@ -145,10 +153,10 @@ def test_counts_that_make_no_sense_or_do_not_fit_are_refused(library: Layer, mon
     with pytest.raises(KumiteError, match="expected at least 2"):
         with_count(crowd, 1)
     with pytest.raises(KumiteError, match=r"do not fit into memory; at most \d+ do"):
-        LiveScene(with_count(crowd, 10**9), library)
+        World(with_count(crowd, 10**9), library)
     monkeypatch.setattr(memory_module, "free_memory", lambda: 20e6)
     fits = memory_module.most_characters(len(library.clips.skeleton))
     assert 100 < fits < 10_000
-    LiveScene(with_count(crowd, 30), library)
+    World(with_count(crowd, 30), library)
     with pytest.raises(KumiteError, match="30 characters with 6000 recorded frames do not fit"):
-        record(LiveScene(crowd, library), 100.0)
+        record(World(crowd, library), 100.0)

@@ -11,21 +11,21 @@ from kumite.control.routes import through
 from kumite.control.styles import NAMES
 from kumite.errors import KumiteError
 from kumite.graph import Layer
-from kumite.scene import BoutScene, SceneSettings, load_scene
+from kumite.scene import SceneSettings, World, load_scene
 from kumite.scene.controls import SPANS, OrderControl, heed
 from kumite.scene.events import CheckPointMissed, CheckPointReached, Decision
 
 
-def fight(fighters: Layer, *, seed: int = 0, depth: int = 1, **red) -> BoutScene:
+def fight(fighters: Layer, *, seed: int = 0, depth: int = 1, **red) -> World:
     """Boxing at a small depth, with something of red's changed."""
     settings = load_scene("boxing").model_dump(exclude_none=True)
     for fighter in settings["fighter"]:
         fighter["depth"] = depth
     settings["fighter"][0].update(red)
-    return BoutScene(SceneSettings.model_validate(settings), fighters, seed=seed)
+    return World(SceneSettings.model_validate(settings), fighters, seed=seed)
 
 
-def run(scene: BoutScene, seconds: float) -> list:
+def run(scene: World, seconds: float) -> list:
     """What red decides meanwhile."""
     count = len(scene.events)
     for _ in range(round(seconds * scene.fps)):
@@ -34,11 +34,11 @@ def run(scene: BoutScene, seconds: float) -> list:
     return [e for e in new if isinstance(e, Decision) and e.character == "red"]
 
 
-def order(scene: BoutScene, field: str) -> OrderControl:
+def order(scene: World, field: str) -> OrderControl:
     return next(o for o in scene.orders_of(0) if o.field == field)
 
 
-def share(scene: BoutScene, decisions: list, name: str) -> float:
+def share(scene: World, decisions: list, name: str) -> float:
     """Of decisions that were for a kind or label."""
     tree = scene.tree
     of = [(tree.kinds[e.stretch], tree.labels[e.stretch]) for e in decisions]
@@ -128,7 +128,7 @@ def test_what_is_refused_leaves_all_as_it_was(fighters: Layer):
         assert order(scene, field).value == before
     with pytest.raises(KumiteError, match="red at check point 0: A⁻ holds every action"):
         scene.set_route("red", Route((CheckPoint((0, 0), refuse=tuple(kinds - {"attack"})),)))
-    with pytest.raises(KumiteError, match=r"fighter 'rde'.*red"):
+    with pytest.raises(KumiteError, match=r"character 'rde'.*red"):
         scene.set_route("rde", None)
     with pytest.raises(KumiteError, match="red has no route"):
         scene.move_check_point("red", 0, (0.0, 0.0))
@@ -178,7 +178,7 @@ def test_a_check_point_is_moved_and_what_is_done_stays_done(fighters: Layer):
 
 
 def test_told_the_same_the_same_seed_gives_the_same_bytes(fighters: Layer):
-    def told() -> BoutScene:
+    def told() -> World:
         scene = fight(fighters, seed=4)
         run(scene, 2.0)
         scene.set_route("red", through([(1.0, 1.0), (2.0, 0.0)], 5.0))

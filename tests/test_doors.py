@@ -27,11 +27,10 @@ from tests.telling import event
 
 JUNK = (None, "sparring", 3, 1.5, [], {}, np.zeros(3), object())
 TAKES = {
-    "LiveScene": lambda x: kumite.LiveScene(x, None),  # type: ignore[arg-type]
-    "BoutScene": lambda x: kumite.BoutScene(x, None),  # type: ignore[arg-type]
+    "World": lambda x: kumite.World(x, None),  # type: ignore[arg-type]
     "DodgeScene": lambda x: kumite.DodgeScene(x, None),  # type: ignore[arg-type]
     "PrepareScene": lambda x: kumite.PrepareScene(x, None),  # type: ignore[arg-type]
-    "library of a scene": lambda x: kumite.LiveScene(kumite.load_scene("sparring"), x),
+    "library of a scene": lambda x: kumite.World(kumite.load_scene("sparring"), x),
     "measure": kumite.measure,
     "save_recording": lambda x: kumite.save_recording("x.rec", x),
     "save_library": lambda x: kumite.save_library("x.kumite", x),

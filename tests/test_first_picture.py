@@ -20,7 +20,7 @@ import pytest
 from kumite.clip import forward_kinematics, tip_positions
 from kumite.errors import KumiteError
 from kumite.graph import Layer
-from kumite.scene import LiveScene, load_scene, measure
+from kumite.scene import World, load_scene, measure
 from kumite.scene.events import Hit
 from kumite.studio import Coming, Interlude, Studio
 from kumite.studio.bodies import pose_uncompiled
@@ -57,10 +57,10 @@ def test_it_plays_over_and_over():
 
 
 @contextlib.contextmanager
-def preparing(stage: LiveScene, go: threading.Event) -> Iterator[tuple[Studio, Coming]]:
+def preparing(stage: World, go: threading.Event) -> Iterator[tuple[Studio, Coming]]:
     """A studio that shows the recorded fight till ``go``."""
 
-    def make(coming: Coming) -> LiveScene:
+    def make(coming: Coming) -> World:
         coming.tell("compiling 34 of 133", 0.25)
         go.wait(60)
         return stage
@@ -73,7 +73,7 @@ def preparing(stage: LiveScene, go: threading.Event) -> Iterator[tuple[Studio, C
 
 
 def test_the_live_scene_follows_in_the_same_page(library: Layer):
-    stage, go = LiveScene(load_scene("target"), library, seed=3), threading.Event()
+    stage, go = World(load_scene("target"), library, seed=3), threading.Event()
     with preparing(stage, go) as (studio, _), join(studio) as page:
         say(page, CAMERA)
         plays_and_is_steered(studio)
@@ -91,7 +91,7 @@ def test_the_live_scene_follows_in_the_same_page(library: Layer):
 
 
 def test_time_counts_from_the_live_scene_on(library: Layer):
-    stage, go = LiveScene(load_scene("target"), library, seed=3), threading.Event()
+    stage, go = World(load_scene("target"), library, seed=3), threading.Event()
     coming = Coming(stage.title, lambda coming: (go.wait(60), stage)[1])
     studio = Studio(Interlude(), port=0, coming=coming)
     coming.start()
@@ -106,7 +106,7 @@ def test_time_counts_from_the_live_scene_on(library: Layer):
 
 
 def test_what_cannot_be_prepared_ends_the_studio_with_its_reason():
-    def make(coming: Coming) -> LiveScene:
+    def make(coming: Coming) -> World:
         raise KumiteError("no such library")
 
     coming = Coming("Target", make)

@@ -9,7 +9,7 @@ import pytest
 from pydantic import ValidationError
 
 from kumite.errors import KumiteError
-from kumite.scene import BoutScene, SceneSettings, load_scene, with_count
+from kumite.scene import SceneSettings, World, load_scene, with_count
 from kumite.scene.events import Reaction
 from kumite.scene.settings_pairs import APART, PairsSettings
 from tests.shared import builtin
@@ -101,7 +101,7 @@ def test_those_who_face_each_other_share_check_points_by_the_middle_between_them
 
 @pytest.mark.slow
 def test_at_the_last_check_point_of_the_spiral_red_knocks_blue_down():
-    scene = BoutScene(load_scene("spiral"), builtin(level="actions"), seed=1)
+    scene = World(load_scene("spiral"), builtin(level="actions"), seed=1)
     routes = [r for r in scene.routes[::2] if r is not None]
     off, felled = [], []  # m of the middle of a pair from its path; m from its end, s
     for _ in range(round(30.0 * scene.fps)):
@@ -115,7 +115,7 @@ def test_at_the_last_check_point_of_the_spiral_red_knocks_blue_down():
                 pair = scene.names.index(e.character) // 2
                 end = routes[pair].places[-1]
                 felled.append((np.hypot(*(middle[pair] - end)), e.frame / scene.fps))
-    lie = [scene.tree.labels[k] == "fall" for k in scene.stretch]
+    lie = [scene.tree.labels[k] == "fall" for k in scene.tree_fighter.stretch]
     assert sum(lie[1::2]) >= 11 and not any(lie[::2])
     assert np.mean(off) <= 0.5
     where, when = np.array(felled).T

@@ -16,7 +16,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from kumite.errors import KumiteError
 from kumite.graph import Layer
-from kumite.scene import LiveScene, load_scene
+from kumite.scene import World, load_scene
 from kumite.studio import Interlude, Studio
 from kumite.studio.gate import MOST_LINES, MOST_PAGES, Gate, Names, place_of
 from tests import browser
@@ -272,7 +272,7 @@ def test_strangers_write_few_lines(caplog: pytest.LogCaptureFixture, capfd):
 
 def test_the_doors_take_nothing_that_is_not_finite(library: Layer):
     """Our own calls check, too: a script may reach them without any page."""
-    stage = LiveScene(load_scene("target"), library, seed=0)
+    stage = World(load_scene("target"), library, seed=0)
     studio = Studio(stage, port=0)
     home, control_of_stage = stage.objects[0].position.copy(), cast(Any, stage.controls[0])
     try:
@@ -297,7 +297,7 @@ def test_the_doors_take_nothing_that_is_not_finite(library: Layer):
             with join(studio) as good:
                 say(good, CAMERA)
                 say(good, GIZMO | {"position": [2.0, 1.4, 0.0]})
-                assert wait(lambda: abs(stage._home[0][0] - 2.0) < 1e-6)
+                assert wait(lambda: abs(stage.hanging._home[0][0] - 2.0) < 1e-6)
             plays_and_is_steered(studio)
     finally:
         studio.close()

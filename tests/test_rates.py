@@ -15,7 +15,15 @@ from kumite.errors import KumiteError
 from kumite.graph import Layer
 from kumite.kernels import character as kernels
 from kumite.kernels import phase as phases
-from kumite.scene import LiveScene, live, load_recording, load_scene, measure, record, with_count
+from kumite.scene import (
+    World,
+    load_recording,
+    load_scene,
+    measure,
+    policy_fighter,
+    record,
+    with_count,
+)
 from kumite.scene.events import Decision
 from kumite.scene.metrics import foot_skate, source_skate
 from kumite.scene.recording import save_recording
@@ -286,8 +294,8 @@ def test_rates_out_of_bounds_are_refused(library: Layer, rate: float):
     assert np.all(cast.rate == 1.0)
 
 
-def _uneven(library: Layer, count: int) -> LiveScene:
-    scene = LiveScene(with_count(load_scene("crowd"), count), library, seed=3)
+def _uneven(library: Layer, count: int) -> World:
+    scene = World(with_count(load_scene("crowd"), count), library, seed=3)
     scene.cast.set_rate(np.arange(count), np.linspace(0.5, 2.0, count))
     return scene
 
@@ -298,7 +306,7 @@ def test_a_crowd_of_many_rates_is_the_same_on_all_cores(
     """And each has moved on by its rate, through all the actions that it took."""
     frames, cores = [], numba.get_num_threads()
     for many, threads in ((10**6, cores), (2, cores), (2, 1)):
-        monkeypatch.setattr(live, "MANY", many)
+        monkeypatch.setattr(policy_fighter, "MANY", many)
         numba.set_num_threads(threads)
         scene = _uneven(library, 20)
         for _ in range(120):
@@ -326,4 +334,4 @@ def test_a_recording_keeps_the_rates(library: Layer, tmp_path: Path):
     decided = [e for e in fight.events if isinstance(e, Decision) and e.jump]
     found = measure(fight).characters
     assert sum(c.joins for c in found) == pytest.approx(len(decided), abs=6)
-    assert record(LiveScene(with_count(load_scene("crowd"), 6), library), 1.0).rate is None
+    assert record(World(with_count(load_scene("crowd"), 6), library), 1.0).rate is None

@@ -7,7 +7,6 @@ import sys
 import numpy as np
 import pytest
 
-import kumite.scene.bout as bout
 from kumite.body import keep_out
 from kumite.clip import SIDES, forward_kinematics
 from kumite.control.game_tree import GameTree
@@ -15,8 +14,8 @@ from kumite.errors import KumiteError
 from kumite.graph import Layer
 from kumite.kernels.blow import NO_BLOW
 from kumite.kernels.moves import FIELDS, place_at
-from kumite.scene import BoutScene, SceneSettings, load_scene, measure, record
-from kumite.scene.apart import held_apart, pairs, push_apart
+from kumite.scene import SceneSettings, World, load_scene, measure, record, world
+from kumite.scene.apart import held_apart, near_pairs, push_apart
 from kumite.scene.events import Reaction
 from kumite.scene.floor import PUSH_SPEED
 from kumite.scene.reactions import MOST_PHYSICAL, Reactions
@@ -29,13 +28,13 @@ def actions() -> Layer:
     return builtin(level="actions")
 
 
-def _fight(actions: Layer, reactions: str = "auto", seed: int = 1) -> BoutScene:
+def _fight(actions: Layer, reactions: str = "auto", seed: int = 1) -> World:
     settings = load_scene("boxing").model_dump(exclude_none=True)
     settings["bout"]["reactions"] = reactions
-    return BoutScene(SceneSettings.model_validate(settings), actions, seed=seed)
+    return World(SceneSettings.model_validate(settings), actions, seed=seed)
 
 
-def _until_hit(scene: BoutScene, seconds: float = 30.0) -> int:
+def _until_hit(scene: World, seconds: float = 30.0) -> int:
     """Runs to the frame of the next reaction; who was struck."""
     for _ in range(round(seconds * scene.fps)):
         before = len(scene.events)
@@ -46,11 +45,12 @@ def _until_hit(scene: BoutScene, seconds: float = 30.0) -> int:
     raise AssertionError("nobody was struck")
 
 
-def _left_alone(scene: BoutScene, monkeypatch: pytest.MonkeyPatch) -> None:
+def _left_alone(scene: World, monkeypatch: pytest.MonkeyPatch) -> None:
     """From now on nobody strikes, chooses or pushes."""
-    monkeypatch.setattr(bout, "push_apart", lambda floor: None)
+    monkeypatch.setattr(world, "push_apart", lambda floor: None)
     monkeypatch.setattr(scene, "_land", lambda landing: None)
-    monkeypatch.setattr(scene, "choose_by_tree", lambda k: int(scene.stretch[k]))
+    fight = scene.tree_fighter
+    monkeypatch.setattr(fight, "decide", lambda k: int(fight.stretch[k]))
     scene.floor.room = scene.floor.room._replace(most=0.0)
 
 
@@ -93,7 +93,7 @@ def test_the_moment_is_smooth_and_the_response_follows(
     moment = scene.reactions._moments[k]
     planted, foot = cast.contacts[k].copy(), [scene.skeleton.joint(f"{s}_foot") for s in SIDES]
     stood = cast.position[k, foot].copy()
-    stretch = int(scene.stretch[k])
+    stretch = int(scene.tree_fighter.stretch[k])
     assert scene.tree.kinds[stretch] == "reaction" and stretch == event.stretch
     _left_alone(scene, monkeypatch)
     hit = len(poses)  # the pose of the hit is kept by the next step
@@ -132,7 +132,7 @@ def test_the_tree_expects_a_struck_fighter_where_it_comes_to(
     scene = _fight(actions, "physical", seed=2)
     k = _until_hit(scene)
     table, tree, cast = actions.table, scene.tree, scene.cast
-    stretch = int(scene.stretch[k])
+    stretch = int(scene.tree_fighter.stretch[k])
     _left_alone(scene, monkeypatch)
     expected = []
     while not cast.frame[k] >= cast.stop[k]:
@@ -140,7 +140,7 @@ def test_the_tree_expects_a_struck_fighter_where_it_comes_to(
         begun = float(scene.frame - local)
         end = begun + float(table.duration[stretch])
         state = tree.state(
-            (stretch, int(scene.stretch[1 - k])),
+            (stretch, int(scene.tree_fighter.stretch[1 - k])),
             (begun, float(scene.frame)),
             (end, float(scene.frame)),
             (cast.facing[k], cast.facing[1 - k]),
@@ -211,7 +211,7 @@ def test_which_fights_are_physical(actions: Layer, physics: None):
 # Apart -------------------------------------------------------------------------------------------
 
 
-def _depth(scene: BoutScene) -> float:
+def _depth(scene: World) -> float:
     body, cast = scene.floor.body, scene.cast
     parts = [held_apart(body, scene.floor.blows.thrown[k]) for k in range(2)]
     poses = [(cast.position[k], cast.world_wxyz[k]) for k in range(2)]
@@ -246,4 +246,5 @@ def test_what_strikes_may_touch(actions: Layer):
     thrown[0] = 7
     left = {body.parts[p] for p in held_apart(body, thrown)}
     assert set(body.parts) - left == {"left_hand", "left_forearm", "left_upper_arm"}
-    assert pairs(np.array([1, 0, 1, -1])) == [(0, 1), (1, 2)]
+    roots = np.array([[0.0, 1.0, 0.0], [1.5, 0.2, 0.0], [3.0, 1.0, 0.0], [9.0, 1.0, 0.0]])
+    assert near_pairs(roots) == [(0, 1), (1, 2)]

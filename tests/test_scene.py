@@ -20,10 +20,10 @@ from kumite.kernels import crowd, near
 from kumite.performer import perform
 from kumite.rotation import from_yaw
 from kumite.scene import (
-    LiveScene,
     Playback,
     Recording,
     SceneSettings,
+    World,
     builtin_scenes,
     load_recording,
     load_scene,
@@ -39,12 +39,12 @@ from tests.telling import event
 
 
 @pytest.fixture(scope="module")
-def sparring(library: Layer) -> LiveScene:
-    return LiveScene(load_scene("sparring"), library, seed=1)
+def sparring(library: Layer) -> World:
+    return World(load_scene("sparring"), library, seed=1)
 
 
 @pytest.fixture(scope="module")
-def fight(sparring: LiveScene) -> Recording:
+def fight(sparring: World) -> Recording:
     sparring.reset(1)
     return record(sparring, 30.0)
 
@@ -191,13 +191,16 @@ def test_a_scene_file_is_read(tmp_path):
     ("text", "message"),
     [
         (GOOD.replace("position = [0, 1]", "position = [0]"), r"character.1.position"),
-        (GOOD.replace('aims_at = "b"', 'aims_at = "c"'), r"a aims at 'c'; expected another name"),
+        (
+            GOOD.replace('aims_at = "b"', 'aims_at = "c"'),
+            "a is against 'c'; expected another",
+        ),
         (GOOD.replace('name = "b"', 'name = "a"'), "twice: a"),
         (GOOD + "approach = 0\nstrike = 0\n", "all weights are 0"),
         (GOOD + "strike = nan\n", "character.1.strike"),
         (
             GOOD + "weight = 1\n",
-            r"mine.toml:12: unknown key 'character.1.weight'; expected one of again, aims",
+            r"mine.toml:12: unknown key 'character.1.weight'; expected one of again, against",
         ),
         (
             GOOD.replace("[0, 1]", "[0, 1e6]"),
@@ -237,10 +240,10 @@ def test_a_library_whose_blows_are_out_of_reach_is_refused(library: Layer):
     effective[np.flatnonzero(~played)[0], 0] = True
     lost = replace(library, strikes=replace(strikes, effective=effective))
     with pytest.raises(KumiteError, match="in the connected part of its graph: nobody can strike"):
-        LiveScene(load_scene("sparring"), lost)
+        World(load_scene("sparring"), lost)
 
 
-def test_the_same_seed_gives_the_same_bytes(sparring: LiveScene, tmp_path):
+def test_the_same_seed_gives_the_same_bytes(sparring: World, tmp_path):
     for name, seed in (("a", 3), ("b", 3), ("c", 4)):
         sparring.reset(seed)
         save_recording(tmp_path / name, record(sparring, 5.0))
@@ -248,7 +251,7 @@ def test_the_same_seed_gives_the_same_bytes(sparring: LiveScene, tmp_path):
     assert a == b and a != c
 
 
-def test_a_recording_begins_where_the_scene_is(sparring: LiveScene):
+def test_a_recording_begins_where_the_scene_is(sparring: World):
     """A scene that has run before: what happened then is not in the recording."""
     sparring.reset(1)
     whole = record(sparring, 10.0)
@@ -276,7 +279,7 @@ def test_bodies_on_one_spot_are_carried_apart_slowly(library: Layer):
             ],
         }
     )
-    scene = LiveScene(settings, library, seed=0)
+    scene = World(settings, library, seed=0)
     for _ in range(int(4 * scene.fps)):
         before = scene.cast.anchor.copy()
         place, room = scene.cast.root_position, scene.floor.room
@@ -305,7 +308,7 @@ def test_two_boxers_fight(fight: Recording):
         assert c.variety > 0.2
 
 
-def test_hits_are_where_a_fist_and_a_body_are(fight: Recording, sparring: LiveScene):
+def test_hits_are_where_a_fist_and_a_body_are(fight: Recording, sparring: World):
     hits = [e for e in fight.events if isinstance(e, Hit)]
     assert hits
     for e in hits:
@@ -347,7 +350,7 @@ def test_a_blow_lands_or_is_blocked_never_both(fight: Recording):
 
 def test_a_struck_body_shows_it(library: Layer):
     """The victim's head is displaced along the blow in the frames after a hit."""
-    scene = LiveScene(load_scene("sparring"), library, seed=1)
+    scene = World(load_scene("sparring"), library, seed=1)
     moved = []
     for _ in range(int(20 * scene.fps)):
         seen = len(scene.events)
@@ -373,7 +376,7 @@ def test_behaviours_are_named_in_scene_files_and_tuned_while_it_runs(library: La
         "strike = 0.0\napproach = 0.0\nbehaviours = { keep_off = 2.0 }\n"
         '[[object]]\nname = "ball"\nposition = [0, 1.5, 0.3]\n'
     )
-    scene = LiveScene(load_scene(str(file)), library, seed=0)
+    scene = World(load_scene(str(file)), library, seed=0)
     for _ in range(int(15 * scene.fps)):
         scene.step()
     away = np.hypot(*(scene.root_position[0, [0, 2]] - [0.0, 0.3]))
@@ -403,9 +406,9 @@ def test_unknown_behaviours_and_weights_all_zero_are_refused(library: Layer, tmp
         )
 
     with pytest.raises(KumiteError, match="unknown behaviour 'cirle'; did you mean 'circle'"):
-        LiveScene(scene(behaviours={"cirle": 1.0}), library)
+        World(scene(behaviours={"cirle": 1.0}), library)
     with pytest.raises(KumiteError, match="has a weight of its own"):
-        LiveScene(scene(behaviours={"strike": 1.0}), library)
+        World(scene(behaviours={"strike": 1.0}), library)
     with pytest.raises(ValueError, match="all weights are 0"):
         scene(approach=0.0, strike=0.0)
 
@@ -414,7 +417,7 @@ def test_unknown_behaviours_and_weights_all_zero_are_refused(library: Layer, tmp
 
 
 def test_a_boxer_goes_for_the_target_wherever_it_is_put(library: Layer):
-    scene = LiveScene(load_scene("target"), library, seed=0)
+    scene = World(load_scene("target"), library, seed=0)
     for place in ([0.0, 1.5, 1.2], [-1.5, 1.45, -1.0], [2.0, 1.5, -1.0]):
         scene.move_object("target", np.array(place))
         before = sum(isinstance(e, Hit) for e in scene.events)
@@ -425,7 +428,7 @@ def test_a_boxer_goes_for_the_target_wherever_it_is_put(library: Layer):
         assert sum(isinstance(e, Hit) for e in scene.events) > before, place
 
 
-def _run(scene: LiveScene, seconds: float) -> tuple[np.ndarray, np.ndarray, int]:
+def _run(scene: World, seconds: float) -> tuple[np.ndarray, np.ndarray, int]:
     """Over a time: where the boxer is [F, 2] on the ground, how far off the target [F], hits."""
     before, ground = sum(isinstance(e, Hit) for e in scene.events), []
     for _ in range(int(seconds * scene.fps)):
@@ -437,7 +440,7 @@ def _run(scene: LiveScene, seconds: float) -> tuple[np.ndarray, np.ndarray, int]
 
 
 def test_a_target_dragged_behind_is_turned_to_and_hit(library: Layer):
-    scene = LiveScene(load_scene("target"), library, seed=0)
+    scene = World(load_scene("target"), library, seed=0)
     scene.move_object("target", np.array([0.0, 1.5, -1.5]))
     _, gap, hits = _run(scene, 20.0)
     assert gap[-1] < 1.0 and hits >= 1
@@ -445,7 +448,7 @@ def test_a_target_dragged_behind_is_turned_to_and_hit(library: Layer):
 
 @pytest.mark.parametrize("height", [0.0, 0.3, 2.6, 50.0])
 def test_a_target_at_a_height_of_no_blow_is_approached_and_kept_near(library: Layer, height):
-    scene = LiveScene(load_scene("target"), library, seed=1)
+    scene = World(load_scene("target"), library, seed=1)
     scene.move_object("target", np.array([0.5, height, 1.5]))
     way, gap, hits = _run(scene, 16.0)
     late = len(way) // 2
@@ -456,11 +459,11 @@ def test_a_target_at_a_height_of_no_blow_is_approached_and_kept_near(library: La
 
 
 def test_a_target_out_of_every_grid_is_walked_to(library: Layer):
-    scene = LiveScene(load_scene("target"), library, seed=0)
+    scene = World(load_scene("target"), library, seed=0)
     place = np.array([-3.5, 1.5, -3.5])
-    policies = scene.skill.policies
+    policies = scene.policy_fighter.skill.policies
     assert not any(p.behaviour.grid.contains(place) for p in policies)
-    assert np.hypot(3.5, 3.5) > scene.skill.strike.behaviour.farthest
+    assert np.hypot(3.5, 3.5) > scene.policy_fighter.skill.strike.behaviour.farthest
     scene.move_object("target", place)
     _, gap, hits = _run(scene, 30.0)
     fifth = len(gap) // 5
@@ -469,12 +472,12 @@ def test_a_target_out_of_every_grid_is_walked_to(library: Layer):
 
 
 def test_a_struck_target_swings_and_comes_back(library: Layer):
-    scene = LiveScene(load_scene("target"), library, seed=0)
+    scene = World(load_scene("target"), library, seed=0)
     home = scene.objects[0].position.copy()
-    scene._swing[0] = np.array([1.0, 0.0, 0.0])
+    scene.hanging._speed[0] = np.array([1.0, 0.0, 0.0])
     far = 0.0
     for _ in range(int(3 * scene.fps)):
-        scene._swing_objects()
+        scene.hanging.step(scene.floor, np.full(1, kernels.NOBODY), lambda landing: None)
         far = max(far, float(np.linalg.norm(scene.objects[0].position - home)))
     assert 0.05 < far < 0.3
     assert np.allclose(scene.objects[0].position, home, atol=0.02)
@@ -589,7 +592,7 @@ def test_source_skate_is_the_clips_own(library: Layer):
 @pytest.mark.slow
 def test_five_minutes_of_the_real_boxer(boxer: Layer):
     """The figures that a fight on real motion must reach, over several seeds."""
-    scene = LiveScene(load_scene("sparring"), boxer)
+    scene = World(load_scene("sparring"), boxer)
     landed = {"red": 0, "blue": 0}
     facing, skate = [], []
     for seed in range(5):
@@ -610,7 +613,7 @@ def test_two_of_one_clip_do_not_move_in_step():
     (jab,) = [c for c in perform("boxing", 0).clips if c.name == "jab"]
     thin = build_frames(concatenate([jab]))
     for seed in range(10):
-        scene = LiveScene(load_scene("sparring"), thin, seed=seed)
+        scene = World(load_scene("sparring"), thin, seed=seed)
         apart = []
         for _ in range(round(10 * scene.fps)):
             scene.step()
@@ -642,12 +645,12 @@ palce = [0.0, 4.0]
 
 
 def test_who_chooses_at_the_same_moment_does_not_choose_the_same(library: Layer):
-    scene = LiveScene(load_scene("sparring"), library, seed=1)
+    scene = World(load_scene("sparring"), library, seed=1)
     cast = scene.cast
     state = int(np.argmax(np.diff(library.table.action_start)))
     for k in range(2):  # twins: in one state, one before the other
         cast.place(k, state, np.array([0.0, k, k * np.pi]))
     scene.floor.start()
     scene.step()
-    first = library.table.first[scene.fighters.choices.stretch]
-    assert abs(int(first[0]) - int(first[1])) > scene.fighters.minds.step
+    first = library.table.first[scene.policy_fighter.fighters.choices.stretch]
+    assert abs(int(first[0]) - int(first[1])) > scene.policy_fighter.fighters.minds.step

@@ -26,7 +26,7 @@ from kumite.export.sheet import (
 )
 from kumite.graph import Layer
 from kumite.kernels.raster import draw_triangles
-from kumite.scene import LiveScene, Recording, load_scene, record
+from kumite.scene import Recording, World, load_scene, record
 from kumite.scene.events import Hit
 from tests import toys
 from tests.telling import event
@@ -52,7 +52,7 @@ def test_a_sheet_has_a_cell_for_every_frame(tmp_path):
 
 
 def test_a_recording_is_drawn(library: Layer, tmp_path):
-    scene = LiveScene(load_scene("target"), library)
+    scene = World(load_scene("target"), library)
     recording_sheet(tmp_path / "r.png", record(scene, 1.0), size=(120, 100))
     assert Image.open(tmp_path / "r.png").size[0] > 300
 
@@ -138,7 +138,7 @@ def test_hits_are_plotted(library: Layer, tmp_path):
 
 @pytest.fixture(scope="module")
 def fight(library: Layer) -> Recording:
-    return record(LiveScene(load_scene("sparring"), library, seed=3), 8.0)
+    return record(World(load_scene("sparring"), library, seed=3), 8.0)
 
 
 def test_a_sheet_shows_the_hits(fight: Recording, tmp_path):

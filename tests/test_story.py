@@ -15,9 +15,9 @@ from kumite.export.gltf import write_glb
 from kumite.export.sheet import recording_sheet
 from kumite.graph import Layer
 from kumite.scene import (
-    BoutScene,
     Playback,
     SceneSettings,
+    World,
     load_recording,
     load_scene,
     record,
@@ -192,8 +192,8 @@ def _settings(**more) -> dict[str, Any]:
     return {**settings, **more}
 
 
-def _scene(actions: Layer, **more) -> BoutScene:
-    return BoutScene(SceneSettings.model_validate(_settings(**more)), actions, seed=1)
+def _scene(actions: Layer, **more) -> World:
+    return World(SceneSettings.model_validate(_settings(**more)), actions, seed=1)
 
 
 CHANGED = {
@@ -244,7 +244,7 @@ def test_who_is_run_over_falls_and_lies_and_the_other_only_idles(actions: Layer)
     )
     settings["fighter"][0]["position"] = (0.0, -0.6)
     settings["fighter"][1].update(stays_down=True, position=(0.0, 1.2))
-    scene = BoutScene(SceneSettings.model_validate(settings), actions, seed=0)
+    scene = World(SceneSettings.model_validate(settings), actions, seed=0)
     for _ in range(8 * round(scene.fps)):
         scene.step()
     (over,) = [e for e in scene.events if isinstance(e, RunOver)]
@@ -346,17 +346,17 @@ def test_cues_of_unknown_actions_are_refused(actions: Layer, orders: dict):
 # The built-in scenes -----------------------------------------------------------------------------
 
 
-def _run(name: str, seconds: float, seed: int) -> BoutScene:
+def _run(name: str, seconds: float, seed: int) -> World:
     settings = load_scene(name)
     assert settings.bout is not None
     library = builtin(settings.bout.library, "actions")
-    scene = BoutScene(settings, library, seed=seed)
+    scene = World(settings, library, seed=seed)
     for _ in range(round(seconds * scene.fps)):
         scene.step()
     return scene
 
 
-def _hits_on(scene: BoutScene, name: str) -> int:
+def _hits_on(scene: World, name: str) -> int:
     return sum(isinstance(e, Hit) and e.victim == name and not e.blocked for e in scene.events)
 
 

@@ -12,7 +12,7 @@ import pytest
 from kumite.clip import forward_kinematics
 from kumite.errors import KumiteError
 from kumite.graph import Layer
-from kumite.scene import LiveScene, Playback, load_scene, record
+from kumite.scene import Playback, World, load_scene, record
 from kumite.scene.events import Hit
 from kumite.studio import Studio, serve, wording
 from kumite.studio.pace import Pace
@@ -20,8 +20,8 @@ from tests import browser
 from tests.stranger import running, wait
 
 
-def live(library: Layer, scene: str, seed: int = 1) -> LiveScene:
-    return LiveScene(load_scene(scene), library, seed=seed)
+def live(library: Layer, scene: str, seed: int = 1) -> World:
+    return World(load_scene(scene), library, seed=seed)
 
 
 def test_nothing_listens_beyond_this_machine(library: Layer):
@@ -165,11 +165,11 @@ def test_the_target_is_dragged_and_the_boxer_goes_for_it(library: Layer):
             start = browser.project(here + reach * axis, client.camera, page)
             end = browser.project(here + (reach + 0.9) * axis, client.camera, page)
             browser.drag(page, start, end)
-            moved = bool(np.linalg.norm(stage._home[0] - home) > 0.2)
+            moved = bool(np.linalg.norm(stage.hanging._home[0] - home) > 0.2)
             if moved:
                 break
         assert moved, "no arrow of the gizmo could be dragged"
-        goal = stage._home[0].copy()
+        goal = stage.hanging._home[0].copy()
         studio.set_speed(4.0)
         studio.toggle()
         reach = 1.1

@@ -8,7 +8,7 @@ import viser
 
 from kumite.control import CheckPoint, Route
 from kumite.graph import Layer
-from kumite.scene import BoutScene, SceneSettings, load_scene
+from kumite.scene import SceneSettings, World, load_scene
 from kumite.scene.events import CheckPointReached, Decision
 from kumite.studio import Studio
 from kumite.studio.paths import Path, Sketch, on_floor, sketched
@@ -17,7 +17,7 @@ from tests.stranger import wait
 from tests.test_studio_actions import _pick, _text
 
 
-def fight(fighters: Layer, pairs: int = 1) -> BoutScene:
+def fight(fighters: Layer, pairs: int = 1) -> World:
     """Boxing at depth 1, of so many pairs side by side."""
     settings = load_scene("boxing").model_dump(exclude_none=True)
     out = []
@@ -27,7 +27,7 @@ def fight(fighters: Layer, pairs: int = 1) -> BoutScene:
             x, z = fighter["position"]
             more = {"name": name, "against": against, "position": (x + 3.0 * pair, z), "depth": 1}
             out.append(fighter | more)
-    return BoutScene(SceneSettings.model_validate(settings | {"fighter": out}), fighters, seed=1)
+    return World(SceneSettings.model_validate(settings | {"fighter": out}), fighters, seed=1)
 
 
 def test_where_a_ray_meets_the_floor():

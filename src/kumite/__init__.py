@@ -2,7 +2,7 @@
 
 The pipeline, one import a stage:
 
-    mocap.load → build_frames → LiveScene → record → measure / write_glb / write_bvh / studio.serve
+    mocap.load → build_frames → World → record → measure / write_glb / write_bvh / studio.serve
 """
 
 from kumite.lazy import names_of

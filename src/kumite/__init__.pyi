@@ -17,12 +17,11 @@ from kumite.graph import (
     save_library,
 )
 from kumite.scene import (
-    BoutScene,
     DodgeScene,
-    LiveScene,
     Playback,
     PrepareScene,
     Recording,
+    World,
     builtin_scenes,
     load_recording,
     load_scene,
@@ -35,18 +34,17 @@ __version__: str
 
 __all__ = [
     "AvoidanceSearch",
-    "BoutScene",
     "Clip",
     "ClipSet",
     "DodgeScene",
     "KumiteError",
     "Layer",
     "Library",
-    "LiveScene",
     "Playback",
     "PrepareScene",
     "Recording",
     "Skeleton",
+    "World",
     "approach",
     "build_actions",
     "build_avoidance",

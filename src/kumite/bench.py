@@ -258,9 +258,9 @@ def _hit_soon_at_best(folder: Path) -> float:
 
 
 def _sparring(folder: Path):
-    from kumite.scene import LiveScene, load_scene
+    from kumite.scene import World, load_scene
 
-    return LiveScene(load_scene("sparring"), _library(folder))
+    return World(load_scene("sparring"), _library(folder))
 
 
 @_figure("run sparring", "× real time", 50.0)
@@ -277,9 +277,9 @@ def _run(folder: Path) -> float:
 
 
 def _crowd(folder: Path, count: int):
-    from kumite.scene import LiveScene, load_scene, with_count
+    from kumite.scene import World, load_scene, with_count
 
-    scene = LiveScene(with_count(load_scene("crowd"), count), _library(folder))
+    scene = World(with_count(load_scene("crowd"), count), _library(folder))
     for _ in range(round(scene.fps)):  # a second in which they come to blows
         scene.step()
     return scene
@@ -363,9 +363,9 @@ def _places(folder: Path):
     """The game of a fight of the folder's actions, and (game, state, players, recent) at moments at
     which someone chooses."""
     from kumite.graph import build_actions
-    from kumite.scene import BoutScene, load_scene, record
+    from kumite.scene import World, load_scene, record
 
-    scene = BoutScene(load_scene("boxing"), build_actions(_clips(folder)), seed=1)
+    scene = World(load_scene("boxing"), build_actions(_clips(folder)), seed=1)
     tree, decide, found = scene.tree, scene.tree.decide, []
 
     def note(state, players, recent, others):

@@ -51,8 +51,8 @@ from kumite.mocap.asfamc import read_amc, read_asf
 from kumite.mocap.bvh import read_bvh
 from kumite.performer import kept
 from kumite.scene import (
-    LiveScene,
     Playback,
+    World,
     load_recording,
     load_scene,
     measure,
@@ -103,7 +103,7 @@ def libraries() -> dict[str, Layer]:
 @functools.cache
 def fight() -> Recording:
     """Two who spar, with a ball and an event of every kind that is told."""
-    scene = LiveScene(load_scene("sparring"), libraries()["frames"], seed=1)
+    scene = World(load_scene("sparring"), libraries()["frames"], seed=1)
     made = record(scene, 2.0)
     frames = len(made)
     return replace(
@@ -205,12 +205,12 @@ def _learned_enough(batch: int, changed: float) -> None:
 
 def _run(library: Layer, level: str) -> None:
     """Have the characters of a scene made for it do something."""
-    from kumite.scene import BoutScene, PrepareScene
+    from kumite.scene import PrepareScene, World
 
     if level == "frames":
-        scene = LiveScene(load_scene("sparring"), library, seed=1)
+        scene = World(load_scene("sparring"), library, seed=1)
     elif level == "actions":
-        scene = BoutScene(load_scene("boxing"), library, seed=1)
+        scene = World(load_scene("boxing"), library, seed=1)
     else:
         scene = PrepareScene(load_scene("ball-kick"), library, seed=1, progress=_learned_enough)
     made = record(scene, 1.0)

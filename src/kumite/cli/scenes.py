@@ -94,7 +94,7 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
         refuse_no_library(library)
     from kumite.control import cache_folder
     from kumite.graph import builtin_layer, builtin_library, load_library
-    from kumite.scene import BoutScene, DodgeScene, EvasionScene, LiveScene, PrepareScene
+    from kumite.scene import DodgeScene, EvasionScene, PrepareScene, World
     from kumite.scene.needs import needs
     from kumite.warm import warm
 
@@ -126,9 +126,7 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
             return PrepareScene(settings, found, seed=seed, cache=cache, progress=learning)
         if settings.dodging:
             return DodgeScene(settings, found, seed=seed)
-        if settings.fighters:
-            return BoutScene(settings, found, seed=seed)
-        return LiveScene(settings, found, seed=seed, cache=cache, progress=Training(bars))
+        return World(settings, found, seed=seed, cache=cache, progress=Training(bars))
 
 
 AtOption = Annotated[
@@ -188,16 +186,23 @@ def run(
     )
     _check_outputs(output or [], [*everyone, *(["the crowd"] if settings.crowd else [])])
     live = _live_scene(settings, library, seed)
+    from kumite.control.conductor import ControllerError
     from kumite.scene import measure, record
 
     with progress() as bars, _asked_to_stop() as asked:
         bar = bars.add(f"running {scene}", total=1.0)
-        recording = record(live, seconds, lambda share: bars.update(bar, share), asked.is_set)
+        failed: KumiteError | None = None
+        try:
+            recording = record(live, seconds, lambda share: bars.update(bar, share), asked.is_set)
+        except ControllerError as error:
+            failed, recording = error, error.recording
     if asked.is_set():
         err.print(f"interrupted after {recording.seconds:.1f} of {seconds:g} s", highlight=False)
     for path in output or []:
         say(f"writing {path}")
         _export(recording, path, at)
+    if failed is not None:
+        raise failed
     show_metrics(measure(recording), as_json)
     if not as_json:
         for line in (*_thinking(live), *(f"wrote {path}" for path in output or [])):

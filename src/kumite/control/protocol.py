@@ -8,6 +8,7 @@ others.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -17,6 +18,7 @@ from kumite.graph.spans import Spans
 from kumite.synthesis import Cast
 
 PASS = -1  # chosen by a controller that leaves it to the next
+SELF = -2  # chosen by a controller that poses its character itself, until another breaks that off
 
 
 @dataclass(frozen=True)
@@ -73,3 +75,52 @@ class Controller(Protocol):
     def interrupted(self, view: View) -> None:
         """What it chose has been cut short: the character was struck."""
         ...
+
+
+class Plain:
+    """A base for controllers of one's own: it leaves everything to the next, breaks nothing off and
+    plays at the captured speed."""
+
+    name = "plain"
+    watches = False  # whether it wants to see every frame; set by what a class overrides
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if "watches" not in cls.__dict__:
+            cls.watches = cls.watch is not Plain.watch or cls.rate is not Plain.rate
+
+    def start(self) -> None:
+        """A scene begins, or begins again."""
+
+    def watch(self, view: View) -> int | None:
+        """See :meth:`Controller.watch`."""
+        return None
+
+    def choose(self, view: View) -> int:
+        """See :meth:`Controller.choose`."""
+        return PASS
+
+    def rate(self, view: View) -> float:
+        """See :meth:`Controller.rate`."""
+        return 1.0
+
+    def interrupted(self, view: View) -> None:
+        """See :meth:`Controller.interrupted`."""
+
+
+class External(Plain):
+    """Leaves its character to whoever runs the world: see ``World.step(choices)``. Without a choice
+    it stands where its action has ended."""
+
+    name = "external"
+
+
+class Called(Plain):
+    """A function as a controller: it is called with a view and returns a span or PASS."""
+
+    def __init__(self, function: Callable[[View], int]) -> None:
+        self._function = function
+        self.name = getattr(function, "__name__", type(function).__name__)
+
+    def choose(self, view: View) -> int:
+        return self._function(view)

@@ -56,6 +56,7 @@ class Player:
     boredom: float = BOREDOM  # score that an action loses for each recent use (B11)
     restlessness: float = RESTLESSNESS  # and for each recent one of its kind
     only: tuple[str, ...] = ()  # the action set, kinds or labels; empty: all
+    stays_down: bool = False  # after a fall
 
     def __post_init__(self) -> None:
         if not 1 <= self.depth <= DEEPEST:

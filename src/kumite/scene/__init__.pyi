@@ -1,9 +1,7 @@
 from kumite.scene.actions import ActionPlayback, action_recording
-from kumite.scene.bout import BoutScene
 from kumite.scene.dodge import DodgeScene
 from kumite.scene.evasion import EvasionScene
 from kumite.scene.events import Event, EventIndex
-from kumite.scene.live import LiveScene
 from kumite.scene.metrics import CharacterMetrics, Metrics, measure
 from kumite.scene.prepare import PrepareScene
 from kumite.scene.recording import Recording, load_recording, save_recording
@@ -18,16 +16,16 @@ from kumite.scene.settings import (
     with_throws,
 )
 from kumite.scene.stage import Playback, SceneObject, Stage
+from kumite.scene.world import Character, World
 
 __all__ = [
     "ActionPlayback",
-    "BoutScene",
+    "Character",
     "CharacterMetrics",
     "DodgeScene",
     "EvasionScene",
     "Event",
     "EventIndex",
-    "LiveScene",
     "Metrics",
     "Playback",
     "PrepareScene",
@@ -35,6 +33,7 @@ __all__ = [
     "SceneObject",
     "SceneSettings",
     "Stage",
+    "World",
     "action_recording",
     "builtin_scenes",
     "load_recording",

@@ -15,14 +15,17 @@ from kumite.scene.floor import PUSH_SPEED, Floor
 from kumite.synthesis import Cast
 
 ALLOWED = 0.02  # m that parts may be in each other: skin gives
+PULL = 5.0  # m/s²: how fast a push begins and ends
 REACH = 1.8  # m between two pelvises beyond which arms do not meet
 STRIKES_WITH = {"hand": ("hand", "forearm", "upper_arm"), "foot": ("foot", "shin", "thigh")}
 
 
-def pairs(opponent: np.ndarray) -> list[tuple[int, int]]:
-    """Who fights whom, each two once, the lower number first; opponent [K]."""
-    both = {(min(k, o), max(k, o)) for k, o in enumerate(opponent.tolist()) if o >= 0}
-    return sorted(both)
+def near_pairs(root: np.ndarray) -> list[tuple[int, int]]:
+    """All who may touch, each two once, the lower number first; roots [K, 3] m."""
+    place = root[:, [0, 2]]
+    away = np.linalg.norm(place[:, None] - place, axis=-1)
+    k, o = np.nonzero(np.triu(away <= REACH, 1))
+    return list(zip(k.tolist(), o.tolist()))
 
 
 def held_apart(body: Body, thrown: np.ndarray) -> np.ndarray:
@@ -36,14 +39,25 @@ def held_apart(body: Body, thrown: np.ndarray) -> np.ndarray:
 
 
 def push_apart(floor: Floor) -> None:
-    """Carry every two who fight and are deeper than :data:`ALLOWED` in each other a bit apart."""
-    cast, thrown = floor.cast, floor.blows.thrown
-    for k, o in pairs(floor.opponent):
-        push_two(
+    """Carry all who are deeper than :data:`ALLOWED` in each other a bit apart.
+
+    How fast they are carried changes by no more than :data:`PULL`, so it is not seen as a jerk.
+    """
+    cast, thrown, fps = floor.cast, floor.blows.thrown, floor.fps
+    wanted = np.zeros_like(floor.pushed)
+    for k, o in near_pairs(cast.root_position):
+        way = way_apart(
             (floor.body, cast, k, held_apart(floor.body, thrown[k])),
             (floor.body, cast, o, held_apart(floor.body, thrown[o])),
-            floor.fps,
+            PUSH_SPEED / fps,
         )
+        wanted[k] += 0.5 * way
+        wanted[o] -= 0.5 * way
+    change = wanted - floor.pushed
+    length = np.maximum(np.hypot(change[:, 0], change[:, 1]), 1e-12)
+    floor.pushed += np.minimum(1.0, PULL / fps**2 / length)[:, None] * change
+    for k in np.flatnonzero(np.any(floor.pushed != 0.0, axis=1)).tolist():
+        cast.carry(k, floor.pushed[k])
 
 
 One = tuple[Body, Cast, int, np.ndarray]
@@ -52,9 +66,18 @@ One = tuple[Body, Cast, int, np.ndarray]
 
 def push_two(one: One, other: One, fps: float, speed: float = PUSH_SPEED) -> None:
     """Carry two who are deeper than :data:`ALLOWED` in each other a bit apart, at most so fast."""
+    way = way_apart(one, other, speed / fps)
+    if way.any():
+        one[1].carry(one[2], 0.5 * way)
+        other[1].carry(other[2], -0.5 * way)
+
+
+def way_apart(one: One, other: One, most: float) -> np.ndarray:
+    """The way [2] m, no longer than ``most``, by which the first is to go farther from the second;
+    0 where they are no deeper than :data:`ALLOWED` in each other."""
     (a, cast_a, k, parts), (b, cast_b, o, other_parts) = one, other
     if np.hypot(*(cast_a.root_position[k] - cast_b.root_position[o])[[0, 2]]) > REACH:
-        return
+        return np.zeros(2)
     found = keep_out(
         a,
         cast_a.position[k],
@@ -66,8 +89,6 @@ def push_two(one: One, other: One, fps: float, speed: float = PUSH_SPEED) -> Non
         other_parts=other_parts,
     )
     if found.depth <= ALLOWED:
-        return
+        return np.zeros(2)
     length = float(np.hypot(*found.displacement))
-    way = min(found.depth - ALLOWED, speed / fps) * found.displacement / length
-    cast_a.carry(k, 0.5 * way)
-    cast_b.carry(o, -0.5 * way)
+    return min(found.depth - ALLOWED, most) * found.displacement / length

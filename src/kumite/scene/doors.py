@@ -18,12 +18,17 @@ def check_scene(settings: object, library: object, seed: object, *layers: str) -
     Errors: settings of no scene, such as its name; no library, or one without the layer; a seed
     that is no number.
     """
+    check_settings(settings)
+    whole(seed, "seed", least=0)
+    return layer_of(library, "library", *layers)
+
+
+def check_settings(settings: object) -> None:
+    """Errors: settings of no scene, such as its name."""
     if not isinstance(settings, BaseModel):
         raise KumiteError(
             f"scene: {shown(settings)}; expected its settings, as kumite.load_scene gives them"
         )
-    whole(seed, "seed", least=0)
-    return layer_of(library, "library", *layers)
 
 
 def layer_of(library: object, what: str, *layers: str) -> Layer:

@@ -29,8 +29,8 @@ from kumite.scene.blows import Blows, Contact
 from kumite.scene.dodgers import Dodgers, volume_of
 from kumite.scene.doors import check_scene, layer_of
 from kumite.scene.events import Avoided, Counter, Event, Foreseen, Hit
-from kumite.scene.live import RECOIL
 from kumite.scene.memory import refuse_too_many
+from kumite.scene.reactions import RECOIL
 from kumite.scene.settings_dodge import DodgeSettings
 from kumite.scene.stage import SceneObject
 from kumite.synthesis import Cast

@@ -53,6 +53,7 @@ class Floor:
             np.zeros(count, dtype=np.int32),
             np.zeros((count, 2), dtype=np.int32),
         )
+        self.pushed = np.zeros((count, 2))  # m in a frame by which bodies carry each away
         parts, limbs = len(self.body), len(LIMBS)
         self.room = kernels.Room(CLOSEST, PUSH_SPEED / self.fps, np.zeros((count, 2)))
         self.blows = kernels.Blows(

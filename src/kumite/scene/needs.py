@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -41,12 +42,32 @@ def needs(settings: SceneSettings) -> Needs:
         style = (settings.dodge or DodgeSettings()).library
         attackers = settings.attacker[0].library if settings.attacker else None
         return Needs("avoidance", style, ("avoidance",), attackers)
-    if settings.fighters:
-        bout = settings.bout or BoutSettings()
-        physics = {"kinematic": "no", "auto": "if installed", "physical": "yes"}[bout.reactions]
-        motions = ("steps",) if bout.library == "locomotion" else ("blows", "steps", "defences")
-        if not settings.avoiding:
-            return Needs("actions", bout.library, motions, physics=physics)
-        layers = ("actions", "avoidance")
-        return Needs("actions", bout.library, (*motions, "avoidance"), None, layers, physics)
-    return Needs("frames", "boxing", ("blows", "steps"))
+    bout = settings.bout or BoutSettings()
+    layers = wanted_layers(settings)
+    level = layers[0]
+    fights = [p for p in settings.people if p.fight is not None]
+    still = bout.library == "locomotion"
+    motions = (("steps",) if still else ("blows", "steps")) if fights else ("steps",)
+    if level == "actions" and not still:
+        motions = (*motions, "defences")
+    motions = (*motions, *(m for m, who in (("avoidance", settings.avoiding),) if who))
+    physics = {"kinematic": "no", "auto": "if installed", "physical": "yes"}[bout.reactions]
+    physics = physics if level == "actions" else "no"
+    style = bout.library if len(layers) == 1 or bout.library != "boxing" else "all"
+    return Needs(level, style, motions, layers=layers, physics=physics)
+
+
+def wanted_layers(settings: SceneSettings, has: Collection[str] = ("frames",)) -> tuple[str, ...]:
+    """The layers that the controllers of a scene's [[character]]s and [[fighter]]s plan on, the
+    first of them the one in which everyone begins.
+
+    has: the layers that there are: policies take a graph of frames, or else one of whole actions.
+    """
+    people = settings.people
+    tree = any(p.by_tree for p in people)
+    out = ["actions"] if tree else []
+    if any(p.by_policy for p in people) and not tree:
+        out.append(next((n for n in ("frames", "actions") if n in has), "frames"))
+    out += ["avoidance"] if settings.avoiding else []
+    out += ["preparation"] if settings.preparing else []
+    return tuple(out) or ("actions",)  # of who leaves everything to others

@@ -125,10 +125,11 @@ class PrepareScene:
             [curves(self.skeleton, {**p.curve, **p.curves.get(m, {})}) for m in self.motions]
         )
 
-    def reset(self, seed: int) -> None:
-        """Start again from the beginning, with a seed."""
+    def reset(self, seed: int, events: list[Event] | None = None) -> None:
+        """Start again from the beginning, with a seed. events: where to tell them; by default a
+        list of its own."""
         self.seed, self.frame = int(seed), 0
-        self.events: list[Event] = []
+        self.events = [] if events is None else events
         self.rng = np.random.default_rng(self.seed)
         self.things.reset()
         walking, foes = self.settings.walking, self.settings.opponents
@@ -146,6 +147,7 @@ class PrepareScene:
         )
         count = len(homes)
         self.thing = np.full(count, NO_THING)  # what each goes to
+        self.pushed = np.zeros((count, 2))  # m by which others have carried each away
         blows = tuple(self.motions.index(m) for m in foes.motions) if foes else ()
         self.opponents = Opponents(foes, self.walkers, self.users, blows, self.rng)
         self.told = np.full((count, 2), np.nan)  # m: or where, by hand
@@ -394,7 +396,8 @@ class PrepareScene:
     def _keep_apart(self) -> None:
         """People give way to each other."""
         w = self.walkers
-        w.push[:] = 0.0
+        w.push[:] = self.pushed
+        self.pushed[:] = 0.0
         if len(self.names) < 2:
             return
         ground = w.shown.root_position[:, [0, 2]]

@@ -8,22 +8,22 @@ import numpy as np
 
 from kumite.checked import checked
 from kumite.checks import number
+from kumite.control.conductor import ControllerError
 from kumite.errors import KumiteError
-from kumite.scene.bout import BoutScene
 from kumite.scene.dodge import DodgeScene
 from kumite.scene.evasion import EvasionScene
-from kumite.scene.live import LiveScene
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.metrics import source_skate
 from kumite.scene.prepare import PrepareScene
 from kumite.scene.recording import NO_FRAME, Recording
+from kumite.scene.world import World
 
 MOST_BYTES = 16e9  # of one recording
 
 
 @checked
 def record(
-    scene: LiveScene | BoutScene | DodgeScene | EvasionScene | PrepareScene,
+    scene: World | DodgeScene | EvasionScene | PrepareScene,
     seconds: float,
     progress: Callable[[float], None] = lambda share: None,
     stop: Callable[[], bool] = lambda: False,
@@ -34,6 +34,9 @@ def record(
 
     A scene that has run before goes on from where it is; its earlier events are left out, and times
     count from the recording's first frame.
+
+    Errors: a time that is none, or more than memory holds; a controller fails: what ran until then
+    is the error's ``recording``.
     """
     seconds = number(seconds, "seconds", above=0.0)
     count, joints = len(scene.names), len(scene.skeleton)
@@ -51,12 +54,17 @@ def record(
     rate = np.empty((frames, count), np.float32)
     things = np.empty((frames, len(scene.objects), 3), np.float32)
     begin, seen = scene.frame, len(scene.events)
+    failed: ControllerError | None = None
     for f in range(frames):
         if f:
             if stop():
                 frames = f
                 break
-            scene.step()
+            try:
+                scene.step()
+            except ControllerError as error:
+                failed, frames = error, f
+                break
         root[f] = scene.root_position
         wxyz[f] = scene.wxyz
         contacts[f] = scene.cast.contacts
@@ -67,7 +75,7 @@ def record(
         if f % 16 == 0:
             progress(f / frames)
     progress(1.0)
-    return Recording(
+    recording = Recording(
         scene=scene.title,
         fps=scene.fps,
         skeleton=scene.skeleton,
@@ -95,3 +103,7 @@ def record(
             "scene": scene.settings.model_dump(mode="json"),
         },
     )
+    if failed is not None:
+        failed.recording = recording
+        raise failed
+    return recording

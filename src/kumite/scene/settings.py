@@ -13,7 +13,7 @@ from kumite import toml
 from kumite.checked import checked
 from kumite.errors import KumiteError
 from kumite.scene import catalogue
-from kumite.scene.settings_base import ARENA, FARTHEST, NEAREST, Finite, Metres, Name, Settings
+from kumite.scene.settings_base import ARENA, NEAREST, Finite, Metres, Name, Settings
 from kumite.scene.settings_dodge import (
     AttackerSettings,
     BallsSettings,
@@ -23,6 +23,13 @@ from kumite.scene.settings_dodge import (
 )
 from kumite.scene.settings_fight import BoutSettings, CueSettings, FighterSettings, VehicleSettings
 from kumite.scene.settings_pairs import MOST_PAIRS, PairsSettings
+from kumite.scene.settings_people import (
+    CharacterSettings,
+    CrowdSettings,
+    Person,
+    of_character,
+    of_fighter,
+)
 from kumite.scene.settings_prepare import (
     OpponentsSettings,
     PrepareSettings,
@@ -31,34 +38,8 @@ from kumite.scene.settings_prepare import (
     WalkersSettings,
 )
 
-Weight = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 DOWN = 2.0  # s after which a ball that was thrown has come down
 SOONEST = 0.02  # s between two throws
-CROWD_SPACING = 1.5  # m between the two of a pair; pairs stand twice as far apart
-
-
-class CharacterSettings(Settings):
-    name: Name
-    position: tuple[Metres, Metres]  # m, x and z
-    yaw_deg: Finite = 0.0  # 0 faces +Z
-    aims_at: Name  # a character (its head), an object, or "nearest"
-    approach: Annotated[Finite, Field(ge=0)] = 1.0  # weights of the behaviours
-    strike: Annotated[Finite, Field(ge=0)] = 6.0
-    behaviours: dict[str, Weight] = Field(default_factory=dict)  # weights of others, by name
-    facing: Annotated[Finite, Field(ge=0)] = 3.5
-    few: Annotated[int, Field(ge=1, le=50)] = 3  # drawn from the best few actions
-    again: Annotated[int, Field(ge=1, le=50)] = 4  # of the best actions weighed a step further
-    personal_space: Annotated[Finite, Field(ge=0, le=3)] = 0.7  # m kept to the other's body
-
-    @model_validator(mode="after")
-    def _some_weight(self) -> CharacterSettings:
-        _refuse_no_weight(self)
-        return self
-
-
-def _refuse_no_weight(of: CharacterSettings | CrowdSettings) -> None:
-    if of.approach + of.strike + sum(of.behaviours.values()) == 0:
-        raise ValueError("all weights are 0; expected approach, strike or another above 0")
 
 
 class ObjectSettings(Settings):
@@ -67,61 +48,6 @@ class ObjectSettings(Settings):
     yaw_deg: Finite = 0.0  # the way it faces, for behaviours that mind it
     radius: Annotated[Finite, Field(gt=0, le=5)] = 0.1
     draggable: bool = True
-
-
-class CrowdSettings(Settings):
-    """Characters that stand in pairs all over a square, each with the nearest who is free."""
-
-    count: Annotated[int, Field(ge=2, le=1_000_000)] = 30
-    spacing: Annotated[Finite, Field(ge=0.8, le=20)] = CROWD_SPACING  # m
-    approach: Annotated[Finite, Field(ge=0)] = 1.0
-    strike: Annotated[Finite, Field(ge=0)] = 6.0
-    behaviours: dict[str, Weight] = Field(default_factory=dict)
-    facing: Annotated[Finite, Field(ge=0)] = 3.5
-    few: Annotated[int, Field(ge=1, le=50)] = 3
-    again: Annotated[int, Field(ge=1, le=50)] = 1  # a crowd decides in a fifth of the time
-    personal_space: Annotated[Finite, Field(ge=0, le=3)] = 0.7
-
-    @model_validator(mode="after")
-    def _some_weight(self) -> CrowdSettings:
-        _refuse_no_weight(self)
-        try:
-            self.refuse_too_wide()
-        except KumiteError as error:  # said with its line, as all that is wrong with a file
-            raise ValueError(str(error)) from None
-        return self
-
-    def refuse_too_wide(self) -> None:
-        """Errors: more than find room."""
-        most = 2 * int(FARTHEST / self.spacing - 1.0) ** 2
-        if self.count > most:
-            raise KumiteError(
-                f"count: {self.count} at a spacing of {self.spacing:g} m do not find room within "
-                f"{FARTHEST:g} m; expected at most {most}"
-            )
-
-    def characters(self) -> tuple[CharacterSettings, ...]:
-        """Pairs on a square lattice, face to face. Errors: more than find room."""
-        self.refuse_too_wide()  # a count given beside the file was not checked with it
-        pairs = (self.count + 1) // 2
-        across = max(1, round(pairs**0.5))
-        shared = self.model_dump(exclude={"count", "spacing"})
-        out = []
-        for k in range(self.count):
-            row, column = divmod(k // 2, across)
-            x = 2.0 * self.spacing * (column - 0.5 * (across - 1))
-            z = 2.0 * self.spacing * (row - 0.5 * ((pairs - 1) // across))
-            side = 0.5 if k % 2 else -0.5
-            out.append(
-                CharacterSettings(
-                    name=f"boxer {k + 1}",
-                    position=(x, z + side * self.spacing),
-                    yaw_deg=180.0 if k % 2 else 0.0,
-                    aims_at=NEAREST,
-                    **shared,
-                )
-            )
-        return tuple(out)
 
 
 class SceneSettings(Settings):
@@ -162,10 +88,24 @@ class SceneSettings(Settings):
         return self.dodger + (self.dodgers.dodgers() if self.dodgers else ())
 
     @cached_property
+    def people(self) -> tuple[Person, ...]:
+        """All [[character]]s and [[fighter]]s, in that order, those of [crowd] and [pairs], too."""
+        return (
+            *(of_character(c) for c in self.characters),
+            *(of_fighter(f) for f in self.fighters),
+        )
+
+    @cached_property
     def avoiding(self) -> tuple[str, ...]:
         """The names of all who avoid what comes at them."""
-        fighters = (f.name for f in self.fighters if "avoid" in f.controllers)
-        return (*(d.name for d in self.dodging), *fighters)
+        people = (p.name for p in self.people if "avoid" in p.controllers)
+        return (*(d.name for d in self.dodging), *people)
+
+    @cached_property
+    def preparing(self) -> tuple[str, ...]:
+        """The names of all who prepare for what they will do."""
+        people = (p.name for p in self.people if "prepare" in p.controllers)
+        return (*(w.name for w in self.walking), *people)
 
     @cached_property
     def characters(self) -> tuple[CharacterSettings, ...]:
@@ -196,42 +136,38 @@ class SceneSettings(Settings):
     def _names_fit(self) -> SceneSettings:
         if self.walking:
             return self._fit_walkers()
-        for part in ("prepare", "target", "opponents"):
-            if getattr(self, part):
-                raise ValueError(f"[{part}] is of [[walker]]s; there are none")
         if self.dodging:
             if self.character or self.crowd or self.fighter or self.pairs or self.object:
                 raise ValueError("[[dodger]]s are among themselves; expected nobody else")
             return self._fit_dodgers()
-        if (self.dodge or self.balls) and not self.avoiding:
-            raise ValueError(
-                "[dodge] and [balls] are of those who avoid; expected [[dodger]]s, or "
-                '[[fighter]]s with controllers = ["avoid", "fight"]'
-            )
-        if self.fighter or self.pairs:
-            if self.character or self.crowd or self.object:
-                raise ValueError("[[fighter]]s fight among themselves; expected nobody else")
-            return self._fit_fighters()
-        if not self.character and self.crowd is None:
+        return self._fit_people()
+
+    def _fit_people(self) -> SceneSettings:
+        if not self.people:
             raise ValueError(
                 "nobody is in it; expected a [[character]], a [crowd], [[fighter]]s or [pairs]"
             )
-        for part in ("bout", "cue", "vehicle"):
-            if getattr(self, part):
-                raise ValueError(f"[{part}] is of [[fighter]]s; there are none")
-        names = [c.name for c in self.characters] + [o.name for o in self.object]
-        twice = sorted(n for n, times in Counter(names).items() if times > 1)
-        if twice:
-            raise ValueError(f"names used twice: {', '.join(twice)}")
-        for c in self.character:
-            if c.aims_at == NEAREST and len(self.characters) > 1:
-                continue
-            if c.aims_at == c.name or c.aims_at not in names:
-                others = ", ".join(n for n in names if n != c.name) or "nothing else"
+        for part in ("prepare", "target", "opponents"):
+            if getattr(self, part) and not self.preparing:
                 raise ValueError(
-                    f"{c.name} aims at {c.aims_at!r}; expected another name of the scene ({others})"
+                    f"[{part}] is of those who prepare; expected [[walker]]s, or "
+                    '[[character]]s with "prepare" among their controllers'
                 )
-        return self
+        if self.opponents:
+            raise ValueError("[opponents] close in on [[walker]]s; expected [[character]]s instead")
+        if (self.dodge or self.balls) and not self.avoiding:
+            raise ValueError(
+                "[dodge] and [balls] are of those who avoid; expected [[dodger]]s, or "
+                '[[character]]s with controllers = ["avoid", "fight"]'
+            )
+        if not any(p.by_tree for p in self.people):
+            for part in ("bout", "cue", "vehicle"):
+                if getattr(self, part):
+                    raise ValueError(
+                        f"[{part}] is of those who fight by game tree; expected [[fighter]]s, or "
+                        '[[character]]s with fight = { by = "tree" }'
+                    )
+        return self._fit_fights()
 
     def _fit_walkers(self) -> SceneSettings:
         others = ("character", "crowd", "fighter", "pairs", "bout", "cue", "vehicle", "object")
@@ -263,13 +199,13 @@ class SceneSettings(Settings):
             raise ValueError(f"names used twice: {', '.join(twice)}")
         return self
 
-    def _fit_fighters(self) -> SceneSettings:
-        names = self.names
-        names = (*names, *(v.name for v in self.vehicle))
+    def _fit_fights(self) -> SceneSettings:
+        things = (*(o.name for o in self.object), *(t.name for t in self.targets))
+        names = (*self.names, *things, *(v.name for v in self.vehicle))
         bout = self.bout or BoutSettings()
         if bout.arena is not None:
             names = (*names, ARENA)
-            for f in self.fighters:
+            for f in self.people:
                 far = hypot(*(abs(x) + bout.scatter for x in f.position))
                 if far > bout.arena:
                     raise ValueError(
@@ -277,7 +213,7 @@ class SceneSettings(Settings):
                         f"{' with scatter' if bout.scatter else ''}, but bout.arena is "
                         f"{bout.arena:g} m; expected it to begin inside"
                     )
-            routes = [(f.name, f.route()) for f in self.fighters]
+            routes = [(f.name, f.route) for f in self.people]
             routes += [(c.who, c.route()) for c in self.cue]
             for name, route in routes:
                 for n, point in enumerate(route.points if route else ()):
@@ -290,15 +226,24 @@ class SceneSettings(Settings):
         twice = sorted(n for n, times in Counter(names).items() if times > 1)
         if twice:
             raise ValueError(f"names used twice: {', '.join(twice)}")
-        known = set(self.names)
-        for f in self.fighters:
-            self._refuse_stranger(f.name, f.against, known)
+        for p in self.people:
+            if p.against is not None:
+                self._refuse_stranger(p, p.against)
+            for name in p.goes_to:
+                if name not in (t.name for t in self.targets):
+                    raise ValueError(
+                        f"{p.name} goes to {name!r}; expected a target "
+                        f"({', '.join(t.name for t in self.targets) or 'there are none'})"
+                    )
+        known = {p.name: p for p in self.people}
         for cue in self.cue:
-            if cue.who not in known:
-                raise ValueError(f"a cue is for {cue.who!r}; expected a fighter")
+            if cue.who not in known or not known[cue.who].by_tree:
+                raise ValueError(
+                    f"a cue is for {cue.who!r}; expected somebody who fights by game tree"
+                )
             if cue.against is not None:
-                self._refuse_stranger(cue.who, cue.against, known)
-        routed = {f.name: f.route() for f in self.fighters}
+                self._refuse_stranger(known[cue.who], cue.against)
+        routed = {p.name: p.route for p in self.people}
         for moment in (*self.cue, *self.vehicle):
             for name in moment.waits_for:
                 route = routed.get(name)
@@ -309,18 +254,22 @@ class SceneSettings(Settings):
                     )
         return self
 
-    @staticmethod
-    def _refuse_stranger(name: str, against: str, known: set[str]) -> None:
-        if against == NEAREST and len(known) > 1:
+    def _refuse_stranger(self, person: Person, against: str) -> None:
+        """Errors: it is against nobody of the scene, or, by game tree, against a thing."""
+        if against == NEAREST and len(self.people) > 1:
             return
-        if against == name or against not in known:
-            others = ", ".join(sorted(known - {name})) or "nobody else"
-            raise ValueError(f"{name} is against {against!r}; expected another fighter ({others})")
+        others = [p.name for p in self.people if p.name != person.name]
+        things = [] if person.by_tree else [o.name for o in self.object]
+        if against not in (*others, *things):
+            told = ", ".join((*others, *things)) or "nothing else"
+            raise ValueError(
+                f"{person.name} is against {against!r}; expected another name of the scene ({told})"
+            )
 
     @property
     def names(self) -> tuple[str, ...]:
         """Of all that move by themselves."""
-        groups = (self.characters, self.fighters, self.dodging, self.attacker, self.walking)
+        groups = (self.people, self.dodging, self.attacker, self.walking)
         foes = range(self.opponents.count) if self.opponents else ()
         return (
             *(c.name for group in groups for c in group),
@@ -330,8 +279,7 @@ class SceneSettings(Settings):
     @property
     def aims(self) -> dict[str, str]:
         """Whom each aims at that always aims at the same."""
-        found = {c.name: c.aims_at for c in self.characters if c.aims_at != NEAREST}
-        found |= {f.name: f.against for f in self.fighters if f.against != NEAREST}
+        found = {p.name: p.against for p in self.people if p.against not in (None, NEAREST)}
         if len(self.dodging) == len(self.attacker) == 1:
             mine, its = self.dodging[0].name, self.attacker[0].name
             found |= {mine: its, its: mine}
@@ -368,8 +316,11 @@ def with_throws(settings: SceneSettings, throws: int) -> SceneSettings:
 
     Errors: nobody in it avoids anything; a number below 0.
     """
-    if not settings.dodging:
-        raise KumiteError(f"throws: nobody avoids in {settings.title!r}; expected [[dodger]]s")
+    if not settings.avoiding:
+        raise KumiteError(
+            f"throws: nobody avoids in {settings.title!r}; expected [[dodger]]s, or characters "
+            'with "avoid" among their controllers'
+        )
     if not 0 <= throws <= 100_000:
         raise KumiteError(f"throws: {throws}, expected from 0 to 100000")
     balls = (settings.balls or BallsSettings()).model_copy(update={"throws": throws})

@@ -10,10 +10,35 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from kumite.control.routes import CheckPoint, Route, line, spiral
-from kumite.control.rules import BOREDOM, DEEPEST, RESTLESSNESS, Player, Rules
+from kumite.control.rules import BOREDOM, DEEPEST, RESTLESSNESS, Player, Rules, Temper
 from kumite.control.styles import Style, style
 from kumite.errors import KumiteError
 from kumite.scene.settings_base import FARTHEST, Finite, Metres, Name, Positive, Settings
+
+Controllers = Annotated[
+    tuple[Literal["avoid", "prepare", "fight", "external"], ...], Field(min_length=1)
+]
+"""Who decides for a character, by priority: the first that has something to say is heard."""
+Weight = Annotated[Finite, Field(ge=0)]
+
+
+def refuse_controllers(controllers: tuple[str, ...]) -> None:
+    """Errors: one twice; one behind another that leaves nothing to it; nobody who always says
+    something."""
+    told = f"controllers = {list(controllers)}"
+    if len(set(controllers)) < len(controllers):
+        raise ValueError(f"{told}; expected each once")
+    if controllers[-1] == "avoid":
+        raise ValueError(
+            f'{told}; expected another behind "avoid", which decides only while something comes'
+        )
+    for name in controllers[:-1]:
+        if name in ("prepare", "external"):
+            raise ValueError(
+                f'{told}; expected "{name}" last: it always has something to say, so nobody '
+                "behind it is heard"
+            )
+
 
 Depth = Annotated[int, Field(ge=1, le=DEEPEST)]
 CHANGES = ("against", "style", "depth", "wanted", "unwanted", "only", "point")  # by a cue
@@ -102,30 +127,19 @@ class Manner(Settings):
             boredom=self.boredom,
             restlessness=self.restlessness,
             only=self.only,
+            stays_down=self.stays_down,
         )
 
 
-class FighterSettings(Manner):
-    name: Name
-    position: tuple[Metres, Metres]  # m, x and z
-    yaw_deg: Finite = 0.0  # 0 faces +Z
-    against: Name  # another fighter, or "nearest": of those who are after it
-    # Who decides, by priority: the first that has something to say is heard.
-    controllers: Annotated[tuple[Literal["avoid", "fight"], ...], Field(min_length=1)] = ("fight",)
+class TreeSettings(Manner):
+    """Fights by game tree, perhaps along check points."""
+
+    by: Literal["tree"] = "tree"
     point: tuple[CheckPointSettings, ...] = ()
     path: PathSettings | None = None  # before the points
 
     @model_validator(mode="after")
-    def _controllers_are_all(self) -> FighterSettings:
-        if self.controllers[-1] != "fight" or len(set(self.controllers)) < len(self.controllers):
-            raise ValueError(
-                f"controllers = {list(self.controllers)}; expected each once, and last "
-                '"fight", which always has something to say'
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _route_is_one(self) -> FighterSettings:
+    def _route_is_one(self) -> Self:
         try:
             self.route()
         except KumiteError as error:
@@ -137,6 +151,56 @@ class FighterSettings(Manner):
         if self.path is None:
             return points
         return self.path.route() if points is None else self.path.route().then(points)
+
+
+class Weights(Settings):
+    """Weights of precomputed policies, and how one chooses by them."""
+
+    approach: Weight = 1.0
+    strike: Weight = 6.0
+    behaviours: dict[str, Weight] = Field(default_factory=dict)  # weights of others, by name
+    facing: Weight = 3.5
+    few: Annotated[int, Field(ge=1, le=50)] = 3  # drawn from the best few actions
+    again: Annotated[int, Field(ge=1, le=50)] = 4  # of the best actions weighed a step further
+    personal_space: Annotated[Finite, Field(ge=0, le=3)] = 0.7  # m kept to the other's body
+
+    @model_validator(mode="after")
+    def _some_weight(self) -> Self:
+        if self.approach + self.strike + sum(self.behaviours.values()) == 0:
+            raise ValueError("all weights are 0; expected approach, strike or another above 0")
+        return self
+
+    def temper(self) -> Temper:
+        return Temper(
+            self.approach,
+            self.strike,
+            self.facing,
+            self.few,
+            again=self.again,
+            personal_space=self.personal_space,
+            more=dict(self.behaviours),
+        )
+
+
+class PolicySettings(Weights):
+    """Fights by precomputed policies."""
+
+    by: Literal["policy"] = "policy"
+
+
+class FighterSettings(TreeSettings):
+    """A fighter by game tree: a :class:`CharacterSettings` whose fight is all it has."""
+
+    name: Name
+    position: tuple[Metres, Metres]  # m, x and z
+    yaw_deg: Finite = 0.0  # 0 faces +Z
+    against: Name  # another character, or "nearest": of those who are after it
+    controllers: Controllers = ("fight",)
+
+    @model_validator(mode="after")
+    def _controllers_are_all(self) -> Self:
+        refuse_controllers(self.controllers)
+        return self
 
 
 class BoutSettings(Settings):

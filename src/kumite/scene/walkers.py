@@ -14,6 +14,7 @@ from kumite.clip import SIDES, ClipSet
 from kumite.control.approaching import MOVES
 from kumite.control.guide import Guide, seen, steered_for
 from kumite.errors import KumiteError
+from kumite.graph.distance import pose_features, squared_distances
 from kumite.rotation import (
     angle,
     from_yaw,
@@ -98,6 +99,7 @@ class Walkers:
         self.alpha = np.zeros(count)  # shown
         self.heeds = np.ones(count, dtype=bool)  # its goal is where wants is to be done
         self.push = np.zeros((count, 2))  # m in the next frame: somebody is in the way
+        self.active = np.ones(count, dtype=bool)  # the others are played by somebody else
         self._stretch = np.full(count, NOTHING)  # of the table, played; or part of one
         self._since = np.zeros(count, dtype=np.int64)  # frames of the motion chosen
         self._heed_now = np.ones(count, dtype=bool)  # something has changed: decide at once
@@ -107,6 +109,7 @@ class Walkers:
         self._way = np.full(count, np.nan)  # heading that it is to have at contact
         self._span = np.zeros((count, 2), dtype=np.int64)  # frames first and contact
         self._earlies: dict[tuple[int, int], tuple[int, int, int]] = {}
+        self._cores_frames: np.ndarray | None = None  # of all cores, for who enters
         cores = preparing.hierarchy.cores
         self._goes = cores.speed > MOVES
         self._stand = int(np.argmin(np.abs(cores.speed)))
@@ -136,6 +139,47 @@ class Walkers:
     def facing(self) -> np.ndarray:
         """Where they are [K, 3]."""
         return self.shown.facing
+
+    # Who comes and goes.
+
+    def enter(self, k: int, frame: int, now: Moment) -> None:
+        """Let character k walk from now on, from a pose that is like a library frame."""
+        self._begin_at(k, *self._core_like(frame), now)
+        self.doing[k], self.level[k], self.alpha[k] = ON_THE_WAY, 0.0, 0.0
+        self.filter.restart(k, 0.0)
+        self.active[k], self.stands[k] = True, False
+        self._stretch[k], self._turn[k], self._slow[k] = NOTHING, 0.0, 0.0
+        self.decide_anew(np.array([k]))
+
+    def leave(self, k: int) -> Moment:
+        """Character k is played by somebody else from now on; what it shows, and how it moves."""
+        self.active[k], self.doing[k] = False, ON_THE_WAY
+        self.level[k] = self.alpha[k] = 0.0
+        return self._moment(k)
+
+    def follow(self, k: int, facing: np.ndarray) -> None:
+        """Character k, who is played by somebody else, is at a facing frame [3] now."""
+        self.shown.place(k, self.cast.facing[k], facing)
+        self.shown.facing[k] = facing
+
+    def _begin_at(self, k: int, land: int, stop: int, now: Moment) -> None:
+        self.cast.adopt(k, land, stop, now)
+        self.shown.place(k, self.cast.facing[k], self.cast.facing[k])
+        self.shown.facing[k] = self.cast.facing[k]
+        self.shown.root_position[k], self.shown.wxyz[k] = now.root_position, now.wxyz
+
+    def _core_like(self, frame: int) -> tuple[int, int]:
+        """The frame of a core that is most like a library frame, and where it comes to a state."""
+        if self._cores_frames is None:
+            cores = self.preparing.hierarchy.cores
+            self._cores_frames = np.concatenate(
+                [np.arange(a + 1, b) for a, b in zip(cores.start.tolist(), cores.stop.tolist())]
+            )
+            self._features = pose_features(self.library.clips)
+        away = squared_distances(self._features, np.array([frame]), self._cores_frames)[0]
+        land = int(self._cores_frames[np.argmin(away)])
+        states = self.library.table.state_frame
+        return land, int(states[np.searchsorted(states, land, side="right")])
 
     # What a target motion needs.
 
@@ -188,7 +232,7 @@ class Walkers:
 
     def ready(self) -> np.ndarray:
         """Who [N] is where its target motion may begin, or as near to it as it comes."""
-        way = (self.doing == ON_THE_WAY) & (self.wants != NOTHING) & self.heeds
+        way = (self.doing == ON_THE_WAY) & (self.wants != NOTHING) & self.heeds & self.active
         off, askew = self.off()
         miss = off + NEAR * askew / AWRY  # who turns gets nearer
         nearer = miss < self._nearest - 0.01
@@ -385,7 +429,7 @@ class Walkers:
         state = np.where(leaves, self._leave_stand[core], state)
         self._stretch[who] = guide.onward[state, core]
         cast.begin(who, self._stretch)
-        for k in who[due].tolist():
+        for k in who[due & self.active[who]].tolist():
             self.tell(
                 Decision(
                     self.frame,
@@ -455,8 +499,7 @@ class Walkers:
                 continue
             if self.cast.frame[k] > frame + 2:
                 continue
-            self.cast.adopt(k, land, stop, self._moment(k))
-            self.shown.place(k, self.cast.facing[k], self.cast.facing[k])
+            self._begin_at(k, land, stop, self._moment(k))
             self._return(np.array([k]), 1.0)
             self._posture_of[k], self._settled[k] = then, False
             self._lead(at_once=np.array([k]))

@@ -12,7 +12,7 @@ import viser
 
 from kumite.control.routes import through
 from kumite.errors import KumiteError
-from kumite.scene import BoutScene
+from kumite.scene import World
 from kumite.scene.controls import OrderControl, StyleControl, heed
 from kumite.studio.doors import Safely, a_place, a_way, within
 from kumite.studio.paths import Sketch, on_floor
@@ -50,7 +50,7 @@ class Direction:
     def __init__(
         self,
         server: viser.ViserServer,
-        fight: BoutScene,
+        fight: World,
         sketch: Sketch,
         director: Director,
         safely: Safely,

@@ -8,7 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 import viser
 
 from kumite.scene.actions import ActionPlayback
-from kumite.scene.bout import BoutScene
+from kumite.scene.world import World
 from kumite.studio.action_list import ActionList
 from kumite.studio.coming import Banner, Coming
 from kumite.studio.direction import Direction, Director
@@ -95,7 +95,7 @@ class Panel:
         fps: float,
         controls: Sequence[Control],
         actions: ActionPlayback | None = None,
-        fight: BoutScene | None = None,
+        fight: World | None = None,
         sketch: Sketch | None = None,
         throws: Throws | None = None,
         volumes: Volumes | None = None,

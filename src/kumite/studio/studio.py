@@ -22,11 +22,11 @@ from kumite.body import body_mesh
 from kumite.clip import forward_kinematics
 from kumite.errors import KumiteError
 from kumite.scene.actions import ActionPlayback
-from kumite.scene.bout import BoutScene
 from kumite.scene.dodge import DodgeScene
 from kumite.scene.events import Hit, Struck
 from kumite.scene.prepare import PrepareScene
 from kumite.scene.stage import Playback, Stage, in_sight
+from kumite.scene.world import World
 from kumite.studio import bodies, props, ring
 from kumite.studio.coming import Coming
 from kumite.studio.doors import a_place, a_seed, within
@@ -131,7 +131,7 @@ class Studio:
         dragged = None if self._walk is None else self._drag_object
         self._targets = props.Targets(server, stage.objects, self.move_object, dragged)
         self._bursts = props.Bursts(server)
-        self._fight = stage if isinstance(stage, BoutScene) else None
+        self._fight = stage if isinstance(stage, World) and stage.fight is not None else None
         self._targeted = np.array([not o.thrown for o in stage.objects], dtype=bool)
         dodge = stage if isinstance(stage, DodgeScene) else None
         self._throws = None if dodge is None else Throws(dodge)
