@@ -35,10 +35,10 @@ from kumite.scene.memory import refuse_too_many
 from kumite.scene.pairs import pair_up
 from kumite.scene.settings import NEAREST, SceneSettings
 from kumite.scene.stage import SceneObject
+from kumite.synthesis.recoil import RECOIL
 
 AIM = "head"
 ANTICIPATION = 0.4  # s of the other's motion that a fighter foresees; then it takes it to stand
-RECOIL = 0.018  # m that a struck segment gives way per m/s of the blow
 SWING = 0.35  # m/s that a struck target gains per m/s of the blow
 SWING_RATE = 7.0  # rad/s of the target's pendulum
 SWING_DAMPING = 0.25  # of critical
