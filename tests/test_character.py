@@ -12,10 +12,9 @@ from kumite.clip import SIDES, forward_kinematics
 from kumite.graph import Layer
 from kumite.kernels import character as kernels
 from kumite.kernels import pose
-from kumite.scene.reactions import RECOIL
 from kumite.synthesis import Cast
 from kumite.synthesis.cast import _below
-from kumite.synthesis.recoil import MOST_GIVEN
+from kumite.synthesis.recoil import MOST_GIVEN, RECOIL
 from tests import toys
 
 FRONT = np.array([0.0, 0.0, 1.0])

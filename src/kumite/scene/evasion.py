@@ -30,10 +30,10 @@ from kumite.scene.dodgers import Dodgers, volume_of
 from kumite.scene.doors import check_scene, layer_of
 from kumite.scene.events import Avoided, Counter, Event, Foreseen, Hit
 from kumite.scene.memory import refuse_too_many
-from kumite.scene.reactions import RECOIL
 from kumite.scene.settings_dodge import DodgeSettings
 from kumite.scene.stage import SceneObject
 from kumite.synthesis import Cast
+from kumite.synthesis.recoil import RECOIL
 
 ANTICIPATION = 0.4  # s of a dodger's motion that an attacker foresees; then it takes it to stand
 NEAR = 2.0  # m from a dodger within which a blow that is meant for another menaces it, too

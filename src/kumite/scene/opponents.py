@@ -8,11 +8,11 @@ from kumite.control.guide import seen
 from kumite.rotation import from_yaw, planar_apply, planar_inverse, rotate
 from kumite.scene.settings_prepare import OpponentsSettings
 from kumite.scene.walkers import NOTHING, ON_THE_WAY, Walkers
+from kumite.synthesis.recoil import RECOIL
 
 NOBODY = -1
 REACH, RING = 0.6, 2.4  # m from a walker at which its opponent stops, and the others do
 SKIN = 0.13  # m from the middle of a trunk to where it is struck
-RECOIL = 0.02  # m that a struck segment gives way per m/s of the blow
 BEHIND = 1.5  # m that an opponent behind counts as farther away than one ahead
 SETTLED = 0.5  # m that another must be nearer: nobody turns to and fro between two
 WATCHED = 0.15  # s over which it is seen how they move

@@ -33,12 +33,12 @@ from kumite.synthesis import (
     find_responses,
     has_physics,
 )
+from kumite.synthesis.recoil import RECOIL
 from kumite.synthesis.response import SIZES
 
 SECONDS = 0.2  # of physics after a blow
 MOST_PHYSICAL = 8  # fighters up to which "auto" is physical: a push takes 30 to 40 ms
 HURRY = 3.0  # cost of a second more of a response: nobody shall stand there and be struck for long
-RECOIL = 0.018  # m that a struck segment gives way per m/s of the blow, without physics
 
 
 @dataclass(frozen=True)

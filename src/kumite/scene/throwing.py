@@ -12,10 +12,10 @@ from kumite.scene.balls import Balls, aimed, capsules_of, velocity_to
 from kumite.scene.events import Avoided, Event, Missed, Struck, Throw, place
 from kumite.scene.settings_dodge import BallsSettings
 from kumite.synthesis import Cast
+from kumite.synthesis.recoil import RECOIL
 
 AIM_SPREAD = 0.03  # m by which throws miss the middle of what they are aimed at
 TRUE = 0.10  # m from a body as it stands: a ball that passes no farther off was aimed well
-RECOIL = 0.01  # m that a struck segment gives way per m/s of the ball
 NEAR = 2.0  # m from a character: so near a ball menaces it, whoever it is thrown at
 
 

@@ -40,7 +40,7 @@ from kumite.scene.needs import wanted_layers
 from kumite.scene.pairs import pair_up
 from kumite.scene.policy_fighter import PolicyFighter
 from kumite.scene.preparer import Preparer
-from kumite.scene.reactions import MOST_PHYSICAL, RECOIL, Reactions
+from kumite.scene.reactions import MOST_PHYSICAL, Reactions
 from kumite.scene.settings import SceneSettings
 from kumite.scene.settings_base import ARENA, NEAREST
 from kumite.scene.settings_dodge import BallsSettings, DodgeSettings
@@ -49,6 +49,7 @@ from kumite.scene.stage import SceneObject
 from kumite.scene.story import Story
 from kumite.scene.throwing import Throwing
 from kumite.scene.tree_fighter import TreeFighter
+from kumite.synthesis.recoil import RECOIL
 
 REPAIRING = 1.0  # s after which those who aim at the nearest look round again
 

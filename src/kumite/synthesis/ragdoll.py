@@ -35,7 +35,7 @@ from kumite.errors import KumiteError
 from kumite.kernels.overlap import deepest_overlaps
 from kumite.synthesis import mjcf
 from kumite.synthesis.moment import Moment
-from kumite.synthesis.recoil import recoiling
+from kumite.synthesis.recoil import RECOIL, recoiling
 
 # Olympic boxers' straight punches to a dummy's face: hand 9.14 ± 2.06 m/s, effective mass
 # 2.9 ± 2.0 kg, 3427 N at the peak (Walilko, Viano & Bir, Br J Sports Med 39:710, 2005, abstract).
@@ -48,7 +48,7 @@ FASTEST = 300.0  # m/s or rad/s at which a simulation has blown up; the hardest 
 HARDEST = 400.0  # m/s² or rad/s² that inverse dynamics follows: what is more is a jump, not motion
 STRONGEST = 30.0  # m/s² likewise of the root: three times the weight is what legs give in a jump
 SWIFTEST = 60.0  # rad/s likewise: capture turns a wrist over between two frames of 120 Hz
-RECOIL = 0.018 / EFFECTIVE_MASS["hand"]  # m per N s that a struck segment gives without physics
+GIVEN = RECOIL / EFFECTIVE_MASS["hand"]  # m per N s that a struck segment gives without physics
 
 
 @dataclass(frozen=True)
@@ -425,7 +425,7 @@ class Ragdoll:
         """The kinematic answer: the motion goes on, and the joints below the blow give."""
         size = np.linalg.norm(impulse)
         most = 30.0 * EFFECTIVE_MASS["hand"]  # N s; beyond any blow, and the turns stay sane
-        blow = RECOIL * impulse * min(1.0, most / max(float(size), 1e-12))
+        blow = GIVEN * impulse * min(1.0, most / max(float(size), 1e-12))
         out = recoiling(self.skeleton, roots, turns, joint, point, blow, self.fps)
         poses = np.concatenate([now.wxyz[None], out])[-2:]
         places = np.concatenate([now.root_position[None], roots])[-2:]
