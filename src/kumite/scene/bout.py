@@ -62,6 +62,7 @@ from kumite.scene.settings_base import ARENA, NEAREST
 from kumite.scene.settings_dodge import BallsSettings, DodgeSettings
 from kumite.scene.settings_fight import CHANGES, BoutSettings, CueSettings
 from kumite.scene.stage import SceneObject
+from kumite.scene.starts import draw_starts, stream
 from kumite.scene.story import Story
 from kumite.scene.throwing import Throwing
 
@@ -188,7 +189,7 @@ class BoutScene:
         self.story = Story(self.settings.cue, self.settings.vehicle, self.fps)
         self.decisions: list[Decision] = []
         count = len(self.names)
-        rng = np.random.default_rng(self.seed)
+        streams = [stream(self.seed, k) for k in range(count)]
         self.floor = Floor(self.library, count, (self.spans.first, self.spans.last))
         self.cast = cast = self.floor.cast
         table = self.library.table
@@ -198,7 +199,7 @@ class BoutScene:
         calm = np.isin(self.tree.kinds, CALM)
         ways = np.diff(table.action_start)[table.target] * calm
         common = np.flatnonzero(ways >= max(np.quantile(ways[calm], 0.5), 1))
-        self.stretch = rng.choice(common, count)
+        self.stretch, begins = draw_starts(self.library, common, streams, at_ends=True)
         self._recent = [deque(maxlen=MEMORY) for _ in range(count)]
         for (k, field), kept in self._kept.items():
             setattr(self.players[k], field, kept)
@@ -211,10 +212,11 @@ class BoutScene:
         self._landed = [NO_BLOW] * count  # the blow each has landed last in what it is doing
         bout = self.bout
         spread = np.array([bout.scatter, bout.scatter, np.radians(bout.scatter_deg)])
-        moved = rng.uniform(-1.0, 1.0, (count, 3)) * spread
         for k, f in enumerate(self.settings.fighters):
-            facing = np.array([*f.position, np.radians(f.yaw_deg)]) + moved[k]
-            cast.place(k, int(table.target[self.stretch[k]]), facing)
+            moved = streams[k].uniform(-1.0, 1.0, 3) * spread
+            facing = np.array([*f.position, np.radians(f.yaw_deg)]) + moved
+            state = int(table.target[self.stretch[k]])
+            cast.place(k, state, facing, frame=int(begins[k]))
         self.floor.start()
         self._nearest = self.floor.opponent == NOBODY
         for k in np.flatnonzero(self._nearest).tolist():

@@ -35,6 +35,7 @@ from kumite.scene.memory import refuse_too_many
 from kumite.scene.pairs import pair_up
 from kumite.scene.settings import NEAREST, SceneSettings
 from kumite.scene.stage import SceneObject
+from kumite.scene.starts import draw_starts, stream
 from kumite.synthesis.recoil import RECOIL
 
 AIM = "head"
@@ -168,7 +169,6 @@ class LiveScene:
         self.frame = 0
         self.events: list[Event] = []
         count = len(self.names)
-        rng = np.random.default_rng(self.seed)
         self.fighters = Fighters(self.skill, self.tempers, self.seed)
         self.objects = [
             SceneObject(o.name, np.array(o.position), o.radius, o.draggable)
@@ -178,18 +178,15 @@ class LiveScene:
         self._swing = [np.zeros(3) for _ in self.objects]
         self.floor = Floor(self.library, count)
         self.cast = cast = self.floor.cast
-        # Everyone starts in a state with many ways out: the usual guard, not the end of a blow.
-        ways = np.diff(self.library.table.action_start)
-        common = np.flatnonzero(ways >= np.quantile(ways, 0.75))
-        free = common.tolist()  # and nobody in another's, while there are states enough
-        for k, c in enumerate(self.settings.characters):
+        # Everyone is on the way to a state with many ways out: the usual guard, not a blow's end.
+        table = self.library.table
+        ways = np.diff(table.action_start)[table.target]
+        common = np.flatnonzero(ways >= np.quantile(np.diff(table.action_start), 0.75))
+        streams = [stream(self.seed, k) for k in range(count)]
+        for k, (stretch, frame) in enumerate(zip(*draw_starts(self.library, common, streams))):
+            c = self.settings.characters[k]
             facing = np.array([*c.position, np.radians(c.yaw_deg)])
-            state = int(rng.choice(common))
-            if state not in free:
-                state = int(rng.choice(free))
-            free.remove(state)
-            free = free or common.tolist()
-            cast.place(k, state, facing)
+            cast.place(k, int(table.target[stretch]), facing, frame=int(frame))
         self.floor.start()
         clips = self.library.clips
         yaws = np.radians([o.yaw_deg for o in self.settings.object])
