@@ -46,6 +46,7 @@ from kumite.scene.settings_base import ARENA, NEAREST
 from kumite.scene.settings_dodge import BallsSettings, DodgeSettings
 from kumite.scene.settings_fight import CHANGES, BoutSettings, CueSettings
 from kumite.scene.stage import SceneObject
+from kumite.scene.starts import draw_starts, stream
 from kumite.scene.story import Story
 from kumite.scene.throwing import Throwing
 from kumite.scene.tree_fighter import TreeFighter
@@ -224,7 +225,7 @@ class World:
             self.floor.opponent[k] = number.get(p.against or "", NOBODY)
             if p.against in things:
                 self.thing[k] = things.index(p.against)
-        stretch = self._place(np.random.default_rng(self.seed))
+        stretch = self._place()
         self.floor.start()
         self._nearest = np.array([p.against == NEAREST for p in people])
         for k in np.flatnonzero(self._nearest).tolist():
@@ -265,32 +266,26 @@ class World:
                 self.events.append,
             )
 
-    def _place(self, rng: np.random.Generator) -> np.ndarray:
+    def _place(self) -> np.ndarray:
         """Everyone where it begins; the stretches [K] of the actions' layer after which they stand,
         -1 of none."""
         people, table = self.settings.people, self.library.table
-        count = len(people)
         homes = np.array([[*p.position, np.radians(p.yaw_deg)] for p in people])
+        streams = [stream(self.seed, k) for k in range(len(people))]
         if self.fight is not None:
-            stretch = rng.choice(self.fight.common, count)
-            bout = self.bout
+            common = self.fight.common
+        else:  # on the way to a state with many ways out: the usual guard, not a blow's end
+            ways = np.diff(table.action_start)
+            common = np.flatnonzero(ways[table.target] >= np.quantile(ways, 0.75))
+        at_ends = self.fight is not None
+        stretch, begins = draw_starts(self.library, common, streams, at_ends=at_ends)
+        bout = self.bout
+        if bout.scatter or bout.scatter_deg:
             spread = np.array([bout.scatter, bout.scatter, np.radians(bout.scatter_deg)])
-            homes = homes + rng.uniform(-1.0, 1.0, (count, 3)) * spread
-            for k, home in enumerate(homes):
-                self.cast.place(k, int(table.target[stretch[k]]), home)
-            return stretch
-        # Everyone starts in a state with many ways out: the usual guard, not the end of a blow.
-        ways = np.diff(table.action_start)
-        common = np.flatnonzero(ways >= np.quantile(ways, 0.75))
-        free = common.tolist()  # and nobody in another's, while there are states enough
+            homes += spread * np.array([rng.uniform(-1.0, 1.0, 3) for rng in streams])
         for k, home in enumerate(homes):
-            state = int(rng.choice(common))
-            if state not in free:
-                state = int(rng.choice(free))
-            free.remove(state)
-            free = free or common.tolist()
-            self.cast.place(k, state, home)
-        return np.full(count, -1)
+            self.cast.place(k, int(table.target[stretch[k]]), home, frame=int(begins[k]))
+        return stretch if at_ends else np.full(len(people), -1)
 
     # What is shown -------------------------------------------------------------------------------
 

@@ -172,10 +172,13 @@ class Cast:
             raise KumiteError(f"cast: rate {wrong[0]:g}, expected {SLOWEST} to {FASTEST}")
         self.rate[who] = asked
 
-    def place(self, k: int, state: int, facing: np.ndarray) -> None:
-        """Put a character into a state (of the action table) at a facing frame, at rest."""
-        f = int(self.library.table.state_frame[state])
-        self.frame[k] = self.stop[k] = f
+    def place(self, k: int, state: int, facing: np.ndarray, *, frame: int | None = None) -> None:
+        """Put a character into a state (of the action table) at a facing frame, at rest.
+
+        frame: of an action that leads there, where it is on the way; None: it is there."""
+        stop = int(self.library.table.state_frame[state])
+        f = stop if frame is None else int(frame)
+        self.frame[k], self.stop[k] = f, stop
         self.fraction[k], self.rate[k], self.pace[k] = 0.0, 1.0, 1.0
         self.held[k] = False
         self.anchor[k] = planar_compose(facing, planar_inverse(self.library.clips.facing[f]))
