@@ -142,10 +142,10 @@ def test_weights_and_depth_count_from_the_next_decision(actions: Layer):
 def test_a_pair_follows_check_points_and_says_what_it_missed(actions: Layer):
     path = {
         "path": {"shape": "line", "centre": (0, 0), "end": (3.0, 0), "points": 4, "radius": 0.6},
-        "style": {"preset": "boxer_path", "place": 1e4},
+        "style": "boxer_path",
         "depth": 2,
     }
-    far = {"style": {"preset": "boxer_path", "place": 1e4}, "depth": 2}
+    far = {"style": "boxer_path", "depth": 2}
     far["point"] = [{"place": (40.0, 0.0), "time": 5.0}]
     scene = _fight(actions, red=path, blue=far)
     _run(scene, 25.0)
@@ -158,7 +158,7 @@ def test_a_pair_follows_check_points_and_says_what_it_missed(actions: Layer):
 def test_each_check_point_that_is_missed_is_told_though_one_before_it_was_reached_late(
     actions: Layer,
 ):
-    late = [{"place": (0.0, 0.0), "time": 0.5, "radius": 20.0, "require": ["attack"]}]
+    late = [{"place": (0.0, 0.0), "time": 0.5, "radius": 20.0, "require": ["defence"]}]
     far = [{"place": (40.0, 0.0), "time": t} for t in (6.0, 8.0)]
     scene = _fight(actions, red={"point": late + far, "depth": 1})
     _run(scene, 9.0)

@@ -8,7 +8,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kumite.control import routes
-from kumite.control.routes import CheckPoint, Missed, Progress, Reached, Route, circle, line, spiral
+from kumite.control.routes import (
+    EARLY,
+    CheckPoint,
+    Missed,
+    Progress,
+    Reached,
+    Route,
+    circle,
+    line,
+    spiral,
+)
 from kumite.errors import KumiteError
 
 
@@ -101,11 +111,27 @@ def test_where_to_be_moves_at_an_even_pace_between_times():
     )
     progress = Progress(Route(points))
     where = [[0, 0], [0, 0], [1, 0], [2, 0], [2, 1], [2, 2], [2, 3], [2, 4], [2, 4]]
-    assert progress.ahead(0.5, 0.5, 12).tolist() == [*where, [2, 4], [2, 4], [2, 4]]
+    found = progress.ahead(0.5 - EARLY, 0.5, 12)
+    assert np.allclose(found, [*where, [2, 4], [2, 4], [2, 4]])
     assert Progress(Route((CheckPoint((3, 1)),))).ahead(0.0, 1.0, 2).tolist() == [[3, 1], [3, 1]]
     for k in range(4):
         progress.update(points[k].place, float(points[k].time or 0), {"duck"})
-    assert progress.ahead(4.5, 0.5, 2).tolist() == [[1, 4], [0, 4]]
+    assert np.allclose(progress.ahead(4.5 - EARLY, 0.5, 2), [[1, 4], [0, 4]])
+
+
+def test_without_a_time_it_is_walked_to_and_who_is_late_is_pressed():
+    progress = Progress(Route((CheckPoint((3.0, 0.0)), CheckPoint((3.0, 1.0)))))
+    progress.update((1.0, 0.0), 10.0)
+    way = progress.ahead(11.0, 1.0, 5)  # 2 m at 0.5 m/s
+    assert np.allclose(way, [[1.5, 0], [2, 0], [2.5, 0], [3, 0], [3, 0]])
+    assert progress.urgency(14.0) == 1.0
+    assert progress.urgency(18.0) == 2.0 and progress.urgency(22.0) == 4.0
+    assert progress.urgency(1e6) == progress.urgency(1e7) < np.inf
+    progress.move(0, (1.0, 4.0))
+    progress.update((1.0, 2.0), 20.0)  # it sets out anew
+    assert progress.urgency(24.0) == 1.0
+    assert progress.update((1.0, 4.0), 24.0) is not None
+    assert progress.urgency(99.0) == 1.0
 
 
 def test_one_update_does_one_check_point():

@@ -60,6 +60,18 @@ def test_every_weight_has_a_column_of_its_own():
     assert STYLES["boxer"].as_array()[columns.PREFERRED_HEADING] == 0.0
 
 
+def test_orders_are_counted_in_solid_blows_of_the_style():
+    place, asked = columns.PLACE, columns.REQUIREMENT
+    for name in ("boxer_path", "chaser_path", "runaway_path", "outboxer"):  # 5 m/s to the head: 10⁶
+        assert STYLES[name].in_play()[[place, asked]].tolist() == [1e6, 1e8]
+    mild = STYLES["boxer_path"].changed(given_short=10.0, given_long=10.0, taken=0.0, place=1.0)
+    assert mild.in_play()[[place, asked]].tolist() == [10.0, 1e4]  # a tenth of 100
+    peaceful = STYLES["boxer"].changed(given_short=0.0, given_long=0.0, taken=0.0)
+    assert peaceful.in_play()[place] == peaceful.suitability
+    others = [c for c in range(columns.COLUMNS) if c not in (place, asked)]
+    assert np.array_equal(mild.in_play()[others], mild.as_array()[others])
+
+
 def test_a_preset_with_some_weights_changed():
     assert style("outboxer") is not None and style("outboxer") == STYLES["outboxer"]
     bold = style({"preset": "outboxer", "taken": 10, "given_short": 1e5})

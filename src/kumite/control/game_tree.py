@@ -248,7 +248,8 @@ class GameTree:
             float(r.fall_from),
             vulnerable,
         )
-        weights = np.stack([p.style.as_array() for p in players])
+        weights = np.stack([p.style.in_play() for p in players])
+        weights[:, PLACE] *= [p.urgency for p in players]
         goals = [
             np.zeros((1, 2)) if p.goal is None else np.reshape(p.goal, (-1, 2)) for p in players
         ]

@@ -52,6 +52,7 @@ class Player:
     wanted: tuple[str, ...] = ()  # A⁺, kinds or labels of actions
     unwanted: tuple[str, ...] = ()  # A⁻
     goal: np.ndarray | None = None  # [G, 2] m, where to be now and every GOAL_EVERY s
+    urgency: float = 1.0  # times its weight that the goal counts now
     facing: float | None = None  # rad, in place of the rules' own
     boredom: float = BOREDOM  # score that an action loses for each recent use (B11)
     restlessness: float = RESTLESSNESS  # and for each recent one of its kind

@@ -8,6 +8,17 @@ says that a distance near the preferred one scores high. Angles are in radians, 
 
     D = ‖v_attack‖ / v' · vulnerability                                                      (Eq. 6)
 
+Orders have a scale of their own: as they stand, w_p = 10 and w_a = 10⁶ are lost beside blows, which
+are worth 10⁵ for each m/s, and nobody goes where he is sent. So both are counted in the worth of a
+solid blow, W = 10 · max(w_D⁺, w_D⁻), one of 5 m/s to the head:
+
+    w_p = 10   makes a metre² off the place cost W: half a metre nearer outweighs one such blow from
+               1.3 m on, and who has come near is free to fight;
+    w_a = 10⁶  makes an action of A⁺ worth 100 W: more than all blows that two choices may land.
+
+Both are proportional: w_p = 1 is a tenth of it. So they hold in any style (:meth:`Style.in_play`).
+A style that gives none, 0, goes by the paper's: what is ordered counts.
+
 with v' = :data:`UNIT_SPEED` and the vulnerability of the part that is hit. S comes from
 :mod:`kumite.control.combination`, p_d and the actions wanted from :mod:`kumite.control.routes`.
 """
@@ -34,6 +45,9 @@ if TYPE_CHECKING:
 else:
     np = Later("numpy")
 
+SOLID = 10.0  # D of a solid blow: 5 m/s to the head
+PATH, ORDER = 10.0, 1e6  # the paper's w_p and w_a
+ORDER_BLOWS = 100.0  # solid blows that w_a = ORDER is worth
 UNIT_SPEED = 1.0  # v', m/s (the paper's 100, of centimetres a second)
 VULNERABILITY = {"head": 2.0, "torso": 1.0, "limbs": 0.0}  # w_being_attack
 SHORT_RANGE = ("hook", "uppercut")
@@ -53,8 +67,8 @@ class Style:
     taken: float = 1e5  # w_D⁻, of damage received
     suitability: float = 1e2  # w_S, of the action combination table
     heading: float = 0.0  # w_γ, of the way it faces in the world [rad]
-    place: float = 0.0  # w_p, of the distance [m] to the next check point
-    requirement: float = 0.0  # w_a, of actions that are wanted, or unwanted, there
+    place: float = 0.0  # w_p, of the distance to the next check point; 10, or 0: it is followed
+    requirement: float = 0.0  # w_a, of actions wanted, or unwanted; 10⁶, or 0: that is heeded
     preferred_heading: float | None = None  # γ_d, rad; None: none
 
     def __post_init__(self) -> None:
@@ -91,6 +105,20 @@ class Style:
             out[getattr(columns, name.upper())] = 0.0 if value is None else value
         return out
 
+    @property
+    def solid_blow(self) -> float:
+        """What a solid blow is worth, given or taken. Where blows do not count: what else does."""
+        blows = SOLID * max(self.given_short, self.given_long, self.taken)
+        return max(blows, self.facing, self.distance, self.suitability)
+
+    def in_play(self) -> np.ndarray:
+        """The weights [COLUMNS] as they count in the game: those of orders in solid blows."""
+        out = self.as_array()
+        out[columns.PLACE] = (self.place or PATH) / PATH * self.solid_blow
+        asked = (self.requirement or ORDER) / ORDER
+        out[columns.REQUIREMENT] = asked * ORDER_BLOWS * self.solid_blow
+        return out
+
     def given(self, actions: Actions) -> np.ndarray:
         """w_D⁺ [A] of the damage that each action gives; 0 for those that are no attacks."""
         attack = actions.kind == KINDS.index("attack")
@@ -122,13 +150,13 @@ STYLES: dict[str, Style] = {
     "boxer": _BOXER,
     "infighter": _BOXER.changed(preferred_distance=0.5, given_long=10.0),
     "outboxer": _BOXER.changed(preferred_distance=2.0, given_short=10.0),
-    "boxer_path": _BOXER.changed(place=10.0, requirement=1e6),
+    "boxer_path": _BOXER.changed(place=PATH, requirement=ORDER),
     "sword_fighter": _SWORD,
-    "sword_fighter_path": _SWORD.changed(place=10.0, requirement=1e6),
+    "sword_fighter_path": _SWORD.changed(place=PATH, requirement=ORDER),
     "chaser": _CHASER,
     "runaway": _RUNAWAY,
-    "chaser_path": _CHASER.changed(place=10.0),
-    "runaway_path": _RUNAWAY.changed(place=10.0),
+    "chaser_path": _CHASER.changed(place=PATH),
+    "runaway_path": _RUNAWAY.changed(place=PATH),
 }
 """The paper's, Tables III and IV."""
 

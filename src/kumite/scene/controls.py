@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from kumite.control import STYLES, Route
+from kumite.control import Route
 from kumite.control.avoidance import AvoidanceSearch
 from kumite.control.game_tree import GameTree, Player
 from kumite.control.styles import ANGLES
@@ -36,7 +36,6 @@ SPANS = {  # least, most, step of what may be tuned; angles in degrees
 OF_PLAYER = ("depth", "boredom", "restlessness")  # the others are of its style
 ORDERS = ("wanted", "unwanted", "only")
 HEADING = 10.0  # w_γ of who is given a heading and minded none: as the other movement terms
-HEEDED = STYLES["boxer_path"]  # whose weights make a path, A⁺ and A⁻ count
 
 
 class StyleControl:
@@ -124,17 +123,6 @@ def check_orders(who: str, tree: GameTree, player: Player, route: Route | None) 
             )
         except KumiteError as error:
             raise KumiteError(f"{who}{where}: {error}") from None
-
-
-def heed(player: Player, field: str) -> str | None:
-    """Give ``place`` or ``requirement`` the weight of a preset that follows paths, if it is 0: else
-    a path or A⁺ has no effect. Says so, if it did.
-    """
-    if getattr(player.style, field) > 0:
-        return None
-    weight = getattr(HEEDED, field)
-    player.style = player.style.changed(**{field: weight})
-    return f"{field} was 0, so that it had no effect: set to {weight:g}"
 
 
 SEARCH_SPANS = {  # least, most, step, and what it is called

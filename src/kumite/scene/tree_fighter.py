@@ -272,6 +272,7 @@ class TreeFighter(Plain):
         return replace(
             player,
             goal=goal + self._beside(k) if _is_shared(progress) else goal,
+            urgency=progress.urgency(self.frame / self.fps),
             wanted=(*player.wanted, *progress.wanted),
             unwanted=(*player.unwanted, *progress.unwanted),
         )

@@ -13,7 +13,7 @@ import viser
 from kumite.control.routes import through
 from kumite.errors import KumiteError
 from kumite.scene import World
-from kumite.scene.controls import OrderControl, StyleControl, heed
+from kumite.scene.controls import OrderControl, StyleControl
 from kumite.studio.doors import Safely, a_place, a_way, within
 from kumite.studio.paths import Sketch, on_floor
 
@@ -139,11 +139,9 @@ class Direction:
                 return
             name = event.target.value.removeprefix(TICK)
             try:
-                said = self._director.direct(lambda: self._toggle(field, name))
+                self._director.direct(lambda: self._toggle(field, name))
             finally:
                 self._refresh()
-            if said:
-                event.client.add_notification("Weight set", said)
 
         dropdown.on_update(self._safely(toggle))
         return dropdown
@@ -151,11 +149,10 @@ class Direction:
     def _order(self, field: str) -> OrderControl:
         return next(o for o in self._fight.orders_of(self._who) if o.field == field)
 
-    def _toggle(self, field: str, name: str) -> str | None:
+    def _toggle(self, field: str, name: str) -> None:
         order = self._order(field)
         without = tuple(n for n in order.value if n != name)
         order.set(without if name in order.value else (*without, name))
-        return heed(order.player, "requirement") if order.value and field != "only" else None
 
     def _list(self, order: OrderControl) -> None:
         dropdown, options = self._orders[order.field], _options(order)
@@ -194,13 +191,11 @@ class Direction:
 
     def _finish(self, event: Any) -> None:
         seconds = within("seconds", self._seconds.value, 0.0, LONGEST) or None
-        said = self._director.direct(lambda: self._set_route(seconds))
+        self._director.direct(lambda: self._set_route(seconds))
         self._listen(False)
         self._refresh()
-        if said:
-            event.client.add_notification("Weight set", said)
 
-    def _set_route(self, seconds: float | None) -> str | None:
+    def _set_route(self, seconds: float | None) -> None:
         """Errors: nothing has been drawn; the drawing goes on then."""
         fight, who = self._fight, self._sketch.who
         if who is None:
@@ -210,7 +205,6 @@ class Direction:
             fight.names[who], through(self._sketch.places, seconds, start=(float(x), float(z)))
         )
         self._sketch.end()
-        return heed(fight.players[who], "place")
 
     def _clear(self) -> None:
         self._sketch.end()
@@ -229,13 +223,12 @@ class Direction:
             return (
                 f"{fight.names[who]}: click on the floor; {len(self._sketch.places)} check points"
             )
-        progress, style = fight.progress[self._who], fight.players[self._who].style
+        progress = fight.progress[self._who]
         if progress is None:
             return "no path"
         count = len(progress.route)
         said = "all done" if progress.done else f"next {progress.index + 1}"
-        weak = "" if style.place > 0 else "; no effect: the weight place is 0"
-        return f"{count} check points, {said}{weak}; drag to move"
+        return f"{count} check points, {said}; drag to move"
 
 
 def _options(order: OrderControl) -> tuple[str, ...]:
