@@ -138,7 +138,7 @@ def test_what_is_refused_leaves_all_as_it_was(fighters: Layer):
 
 
 def test_a_route_is_followed_from_when_it_is_given(fighters: Layer):
-    scene = fight(fighters)
+    scene = fight(fighters, depth=2)
     run(scene, 4.0)
     x, _, z = scene.root_position[0]
     places = [(x + 1.0, z), (x + 2.0, z)]
