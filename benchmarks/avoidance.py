@@ -128,8 +128,10 @@ def _play(name: str, seed: int, throws: int, blind: bool) -> list[Thrown]:
         return found
 
     vars(search)["search"] = noted
+    kept = [list(controllers) for controllers in scene.controllers]
     if blind:
-        vars(scene.dodgers)["menace"] = lambda *given, **said: None
+        for controllers in scene.controllers:
+            del controllers[0]
     spheres, before, first, most = search.spheres, None, None, 0.0
     current = -1
     for _ in range(round((1.0 + throws * EVERY) * scene.fps)):
@@ -164,6 +166,8 @@ def _play(name: str, seed: int, throws: int, blind: bool) -> list[Thrown]:
         else:
             before = None
     del vars(search)["search"]
+    for controllers, all_of_them in zip(scene.controllers, kept, strict=True):
+        controllers[:] = all_of_them
     return out
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from typing import Any
 
@@ -14,14 +12,15 @@ from hypothesis import strategies as st
 
 from kumite.annotate import AvoidanceParts, no_avoidance
 from kumite.body import lay_body
-from kumite.control.avoidance import Avoidance, AvoidanceSearch, Outcome, Plan
+from kumite.control.attack import thrown
+from kumite.control.avoidance import AvoidanceSearch, Outcome
+from kumite.control.avoider import Avoider
+from kumite.control.protocol import PASS, Plain, View
 from kumite.errors import KumiteError
 from kumite.graph import build_avoidance, find_avoiding_transitions
-from kumite.scene import dodgers
 from kumite.scene.balls import Balls, capsules_of, velocity_to
 from kumite.scene.dodge import DodgeScene
-from kumite.scene.dodgers import _after
-from kumite.scene.events import Avoided, Missed, Stale, Struck, Throw
+from kumite.scene.events import Avoided, Decision, Missed, Searched, Struck, Throw
 from kumite.scene.settings import SceneSettings
 from kumite.scene.settings_dodge import (
     BallsSettings,
@@ -131,17 +130,18 @@ def test_balls_that_make_no_sense(wrong):
 # The scene ---------------------------------------------------------------------------------------
 
 
-def scene(seed: int = 1, count: int = 1, latency: int = 1, every: float = 1.2) -> DodgeScene:
-    who: dict = {"dodger": [DodgerSettings(name="d", position=(0, 0)).model_dump()]}
+def scene(seed: int = 1, count: int = 1, reaction: float = 0.0, every: float = 1.2) -> DodgeScene:
+    one = DodgerSettings(name="d", position=(0, 0), reaction=reaction)
+    who: dict = {"dodger": [one.model_dump()]}
     if count > 1:
-        who = {"dodgers": DodgersSettings(count=count, spacing=2.0).model_dump()}
+        many = DodgersSettings(count=count, spacing=2.0, reaction=reaction)
+        who = {"dodgers": many.model_dump()}
     made = SceneSettings.model_validate(
         {
             "title": "t",
             "about": "a",
             **who,
             "balls": {"throws": 1000, "every": every, "first": 0.3, "speed": [5.0, 9.0]},
-            "dodge": {"latency": latency},
         }
     )
     return DodgeScene(made, few(), seed=seed)
@@ -155,26 +155,29 @@ def told(made: DodgeScene, frames: int) -> tuple[bytes, list]:
     return b"".join(poses), [e.to_json() for e in made.events]
 
 
-@pytest.mark.parametrize("latency", [1, 10])
-def test_the_same_seed_gives_the_same_bytes(latency: int, monkeypatch):
-    first = told(made := scene(4, 2, latency), 240)
+@pytest.mark.parametrize("reaction", [0.0, 0.2])
+def test_the_same_seed_gives_the_same_bytes(reaction: float):
+    first = told(made := scene(4, 2, reaction), 240)
     made.reset(4)
     assert told(made, 240) == first
     kinds = [e[1] for e in first[1]]
     assert kinds.count("throw") >= 6
-    # However long searches take, and in however many threads.
-    plain, rng = AvoidanceSearch.search, np.random.default_rng(0)
-
-    def late(self, *given, **more):
-        time.sleep(float(rng.uniform(0.0, 0.03)))
-        return plain(self, *given, **more)
-
-    monkeypatch.setattr(AvoidanceSearch, "search", late)
-    monkeypatch.setattr(dodgers, "_POOL", [ThreadPoolExecutor(3)])
-    made.reset(4)
-    assert told(made, 240) == first
     made.reset(5)
     assert told(made, 240) != first
+
+
+def test_another_changes_nobody_elses_luck():
+    """Each draws from numbers of its own, whoever else is there."""
+    poses = []
+    for count in (2, 3):
+        made = scene(4, 1, every=100.0)
+        who = [DodgerSettings(name=f"d{k}", position=(3.0 * k, 0)) for k in range(count)]
+        made = DodgeScene(made.settings.model_copy(update={"dodger": tuple(who)}), few(), seed=4)
+        made.throwing.streams = False
+        for _ in range(120):
+            made.step()
+        poses.append(made.wxyz[:2].copy())
+    assert np.array_equal(*poses)
 
 
 def test_every_throw_is_told_of_once():
@@ -204,7 +207,8 @@ def test_avoiding_helps():
     for blind in (False, True):
         made = scene(7, 4, every=0.5)
         if blind:
-            vars(made.dodgers)["menace"] = lambda *given, **said: None
+            for controllers in made.controllers:
+                del controllers[0]
         for _ in range(700):
             made.step()
         kinds = [e.kind for e in made.events]
@@ -212,59 +216,101 @@ def test_avoiding_helps():
     assert seen[False] < seen[True]
 
 
-# Searches in the background ----------------------------------------------------------------------
+# What is known, and when -------------------------------------------------------------------------
 
 
-def test_what_is_left_of_a_path():
-    assert _after((1, 2, 3), []) == (1, 2, 3)
-    assert _after((1, 2, 3), [1]) == (2, 3)
-    assert _after((1, 2, 3), [1, 2, 3]) == ()
-    assert _after((1, 2, 3), [2]) is None
-    assert _after((1,), [1, 2]) is None
-    assert _after((), [1]) is None
+@pytest.mark.parametrize("reaction", [0.0, 0.1, 0.25])
+def test_nobody_sees_what_cannot_have_been_seen_yet(reaction: float):
+    """Until a reaction after the throw all goes on as if nothing had been thrown."""
+    with_ball, without = scene(3, 1, reaction, every=100.0), scene(3, 1, reaction, every=100.0)
+    with_ball.throwing.streams = without.throwing.streams = False
+    begin = 17
+    for made in (with_ball, without):
+        for _ in range(begin):
+            made.step()
+    ahead = np.array([0.0, 0.0, 7.0])
+    with_ball.throw(with_ball.root_position[0] + ahead, with_ball.root_position[0], 4.5)
+    same = []
+    for _ in range(45):
+        with_ball.step()
+        without.step()
+        same.append(np.array_equal(with_ball.wxyz, without.wxyz))
+    known = begin + int(np.ceil(reaction * FPS - 1e-9))
+    searches = [e for e in with_ball.events if isinstance(e, Searched)]
+    assert searches[0].frame == known
+    assert all(same[: known - begin])
+    assert any(e.outcome == Outcome.FOUND for e in searches)
+    assert not all(same)  # it does something about it
 
 
-def found_by(made: DodgeScene, paths: list[tuple[int, ...]]) -> Avoidance:
-    now = made.frame / made.fps
-    plan = Plan(paths[0], 0, now, np.array([0.0, 30.0]), np.array([0.0, 1.0]))
-    others = tuple((p, 0) for p in paths[1:])
-    told = {"cost": 0.5, "costs": (0.2, 0.2, 0.1), "distance": 0.1, "before": -0.1}
-    return Avoidance(Outcome.FOUND, paths[0], 0, 0.5, **told, plan=plan, others=others)
+def test_more_of_an_attack_replaces_it_a_reaction_later():
+    avoider = Avoider(AvoidanceSearch(few()), lambda found, threat: None, reaction=0.2)
+    first, better = (thrown([0.0, 1.0, z], [0.0, 2.0, -9.0], 0.1) for z in (6.0, 7.0))
+    avoider.mind(first, 4, 0.0, attacker="red")
+    avoider.mind(better, 4, 0.1, attacker="red")
+    avoider.mind(first, 5, 0.1, avoid=False)
+    assert avoider.watches
+    for now, known in ((0.19, []), (0.2, [first]), (0.3, [better, first])):
+        avoider._learn(now)
+        assert [t.attack for t in avoider.threats] == known
+    assert [t.settled for t in avoider.threats] == [False, True]
+    avoider.forget(4)
+    avoider.forget(5)
+    assert not avoider.watches
 
 
-@pytest.mark.parametrize("fits", [True, False])
-def test_stale_candidates_are_dropped(fits: bool, monkeypatch):
-    """Another edge has begun meanwhile: the best path with that edge is taken, or none."""
-    table, timed = few().table, []
-    made = scene(1, 1, latency=75)
-    made.step()
-    mind = made.dodgers.minds[0]
-    state = int(table.target[mind.stretch])
-    ways = table.stretch[table.actions_of(state)].tolist()
-    calm = [w for w in ways if not made.dodgers._avoids[w]]
-    other = ways[0]
+def test_who_is_not_attacked_is_not_asked(monkeypatch):
+    made, asked = scene(1, 3, every=100.0), []
+    watch = Avoider.watch
 
-    def searched(self, standing, attacks, now, *, main=0):
-        # Whatever is chosen, one of these goes on with it.
-        return found_by(made, [(99999, other), *((w, other) for w in calm if fits)])
+    def noted(self, view):
+        asked.append((view.me, view.frame))
+        return watch(self, view)
 
-    def plan(self, standing, path, part, aim, now):
-        timed.append(tuple(path))
-        return Plan(tuple(path), part, now, np.array([0.0, 30.0]), np.array([0.0, 1.0]))
-
-    monkeypatch.setattr(AvoidanceSearch, "search", searched)
-    monkeypatch.setattr(AvoidanceSearch, "timed", plan)
-    made.throw(np.array([0.0, 1.2, 7.0]), np.array([0.0, 1.2, 0.0]), 2.0)
-    edges = mind.edges
-    for _ in range(100):
+    monkeypatch.setattr(Avoider, "watch", noted)
+    made.throwing.streams = False
+    for _ in range(60):
         made.step()
-        if timed or any(isinstance(e, Stale) for e in made.events):
-            break
-    assert mind.edges > edges
-    if fits and mind.edges == edges + 1:
-        assert timed == [(other,)]
-    if not fits:
-        assert not timed and any(isinstance(e, Stale) for e in made.events)
+    assert not asked
+    here = made.root_position[2]
+    behind = here - np.array([0.0, 0.0, 6.0])  # the ball goes on to the first, not to the second
+    made.throw(behind, here, 9.0, at=2)
+    for _ in range(200):
+        made.step()
+    assert 2 in {k for k, _ in asked} <= {0, 2} and max(f for _, f in asked) < 180
+
+
+class Whim(Plain):
+    """Takes any way on now and then, whatever anybody else wants."""
+
+    name = "whim"
+
+    def watch(self, view: View) -> int | None:
+        return int(view.cast.stop[view.me]) if view.rng.random() < 0.05 else None
+
+    def choose(self, view: View) -> int:
+        table = few().table
+        if view.rng.random() < 0.6:
+            return PASS
+        state = int(np.searchsorted(table.state_frame, view.cast.stop[view.me]))
+        return int(view.rng.choice(table.stretch[table.actions_of(state)]))
+
+
+def test_a_plan_is_dropped_where_somebody_else_goes_elsewhere():
+    """Whatever stands before it, every edge begins in the state in which the last has ended."""
+    made, table = scene(5, 2, every=0.4), few().table
+    for controllers in made.controllers:
+        controllers.insert(0, Whim())
+    at = [int(table.target[s]) for s in made.side.conductor.span]
+    for _ in range(900):
+        made.step()
+    told = [e for e in made.events if isinstance(e, Decision)]
+    for e in told:
+        k = made.names.index(e.character)
+        assert e.stretch in table.stretch[table.actions_of(at[k])]
+        at[k] = int(table.target[e.stretch])
+    by = [e.by for e in told]
+    assert min(by.count(n) for n in ("whim", "avoid", "roam")) > 3
 
 
 # The graph ---------------------------------------------------------------------------------------
@@ -321,6 +367,6 @@ def test_no_parts_no_graph():
 
 def test_settings_that_make_no_sense():
     wrong: dict[str, Any]
-    for wrong in ({"window": 0}, {"most": 8.0}, {"latency": 0}, {"body": -1}):
-        with pytest.raises(ValueError, match=r"input|less|greater"):
+    for wrong in ({"window": 0}, {"most": 8.0}, {"latency": 1}, {"body": -1}):
+        with pytest.raises(ValueError, match=r"input|less|greater|reaction"):
             DodgeSettings(**wrong)

@@ -14,7 +14,7 @@ from kumite.clip import Skeleton
 from kumite.errors import KumiteError
 from kumite.performer import skeleton as figure
 from kumite.scene import DodgeScene, load_scene
-from kumite.scene.dodgers import volume_of
+from kumite.scene.avoiding import volume_of
 from kumite.scene.settings_dodge import DodgeSettings
 from tests import dodging, toys
 

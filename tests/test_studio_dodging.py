@@ -10,6 +10,7 @@ import pytest
 
 from kumite.control.attack import thrown
 from kumite.control.avoidance import AvoidanceRules
+from kumite.control.avoider import standing
 from kumite.errors import KumiteError
 from kumite.graph import Layer
 from kumite.rotation import planar_apply
@@ -158,11 +159,13 @@ def test_controls_act_on_the_next_search_and_no_other(avoiders: Layer):
         assert controls[field].value == value
     assert stage.search.settings.weights == (1.0, 3.0, 1.0)
     assert stage.search.settings.window == 2.0 and stage.search.weighing.clearance == 0.1
-    assert stage.dodgers.search is stage.search and before.settings.window == 1.0
+    assert (
+        all(a.search is stage.search for a in stage.side.avoiders) and before.settings.window == 1.0
+    )
     assert before.weighing.clearance == 0.02
     assert stage.search.index is before.index and stage.search.masks is before.masks
     stage.reset(2)
-    assert stage.dodgers.search.settings.window == 2.0
+    assert stage.side.avoiders[0].search.settings.window == 2.0
     with pytest.raises(KumiteError, match="clearance"):
         controls["clearance"].set(-1.0)
     with pytest.raises(KumiteError, match="horizon"):
@@ -172,14 +175,14 @@ def test_controls_act_on_the_next_search_and_no_other(avoiders: Layer):
 
 def test_searches_under_way_keep_their_rules(avoiders: Layer):
     stage = dodgeball(avoiders)
-    goal, standing = stage.root_position[0], stage.dodgers.standing(0)
+    goal, here = stage.root_position[0], standing(stage.cast, 0, int(stage.cast.stop[0]))
     attacks = [
         thrown(goal + np.array([x, 0.2, 5.0]), [-x * 1.6, 0.5, -8.0], 0.1, gravity=2.0)
         for x in np.linspace(-1.0, 1.0, 40)
     ]
 
     def all_of(search) -> list:
-        found = [search.search(standing, [a], 0.0) for a in attacks]
+        found = [search.search(here, [a], 0.0) for a in attacks]
         return [(f.outcome, f.path, f.part, f.counts) for f in found]
 
     search, alone = stage.search, all_of(stage.search)
@@ -223,7 +226,8 @@ def test_switches_add_and_remove_volumes(avoiders: Layer):
             pytest.fail(f"only {seen} were seen")
         body = volumes._body
         assert body is not None
-        assert np.allclose(body.batched_positions, body_volume(stage.dodgers, 0).centre, atol=1e-5)
+        centre = body_volume(stage.cast, 0, stage.search.spheres).centre
+        assert np.allclose(body.batched_positions, centre, atol=1e-5)
         for field in ("body", "attacks", "left"):
             setattr(volumes.shown, field, False)
             studio._draw(studio._look(), 1 / 60)
@@ -237,15 +241,15 @@ def test_the_avoidance_volume_is_where_the_body_comes_by(avoiders: Layer):
     near, plan, left = [], None, None
     for _ in range(2400):
         stage.step()
-        mind, cast = stage.dodgers.minds[0], stage.cast
-        if mind.plan is None:
+        avoider, cast = stage.side.avoiders[0], stage.cast
+        if avoider.plan is None:
             continue
-        if mind.plan is not plan:
-            plan, left = mind.plan, avoidance_volume(stage.dodgers, 0)
+        if avoider.plan is not plan:
+            plan, left = avoider.plan, avoidance_volume(cast, 0, avoider)
             assert len(left.radius) and left.centre[:, 1].min() > -0.1
-        begins = int(stage.search.graph.begins[mind.plan.part])
+        begins = int(stage.search.graph.begins[avoider.plan.part])
         there = cast.frame[0] + cast.fraction[0]
-        if mind.next_edge == len(mind.plan.path) and abs(there - begins) < 0.5:
+        if not avoider.rest and abs(there - begins) < 0.5:
             assert left is not None
             # As captured: what is shown is still being smoothed after a join.
             place = stage.search.spheres.of_frames(avoiders.clips)[begins].T

@@ -26,6 +26,7 @@ from kumite.control.rules import AvoidanceRules
 from kumite.control.volumes import joins_of, volumes_of
 from kumite.errors import KumiteError, unknown
 from kumite.graph import Layer
+from kumite.graph.spans import entries, nearest
 from kumite.kernels import avoid as kernels
 from kumite.kernels import cells, paths
 from kumite.kernels.joins import PLACES
@@ -226,6 +227,25 @@ class AvoidanceSearch:
     def index(self) -> cells.Index:
         """Section 5.1's grids of all states."""
         return _build_index(self)
+
+    @cached_property
+    def entries(self) -> np.ndarray:
+        """The frame of the next state of each frame's clip [F], at it or after it."""
+        return entries(self.library)
+
+    @cached_property
+    def nearest(self) -> tuple[np.ndarray, np.ndarray]:
+        """The frame of the state most like each frame [F], and how far off that is [F] rad."""
+        stretch, far = nearest(self.library)
+        return self.library.table.last[stretch], far
+
+    @cached_property
+    def strikes(self) -> np.ndarray:
+        """Frames [F] in which a blow is driven home."""
+        out, blows = np.zeros(len(self.library.clips), dtype=bool), self.library.strikes
+        for start, lands in zip(blows.start.tolist(), blows.frame.tolist()):
+            out[start : lands + 1] = True
+        return out
 
     @property
     def index_bytes(self) -> int:

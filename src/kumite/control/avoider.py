@@ -1,8 +1,9 @@
 """A controller that gets its character out of the way (Oshita & Masaoka 2011).
 
-It chooses only while an attack is coming. The character may be in any layer: where the capture that
-it plays comes past a state of the avoidance layer, an avoidance may be begun there without a join;
-where that would be too late, it is begun at once, by a join, as from the state most like the pose.
+It chooses only while an attack is coming. Where its character plays an edge of the avoidance layer,
+it goes on from that edge's end. Elsewhere, where the capture that is played comes past a state of
+that layer, an avoidance may be begun there without a join; where that would be too late, it is
+begun at once, by a join, as from the state most like the pose.
 """
 
 from __future__ import annotations
@@ -12,11 +13,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from kumite.annotate import Strikes
 from kumite.control.attack import Attack
 from kumite.control.avoidance import NONE, Avoidance, AvoidanceSearch, Outcome, Plan, Standing
-from kumite.control.protocol import PASS, View
-from kumite.graph.spans import NO_STATE, entries, nearest
+from kumite.control.protocol import NO_SPAN, PASS, View
+from kumite.graph.spans import NO_STATE
 from kumite.rotation import planar_compose, planar_inverse
 from kumite.synthesis import Cast
 
@@ -32,97 +32,128 @@ class Threat:
 
     attack: Attack
     number: int
-    name: str  # of what attacks
-    tried: set[int] = field(default_factory=set)  # states from which avoiding it was thought about
+    ball: str | None = None  # that is thrown, or …
+    attacker: str | None = None  # … whose blow it is
+    tried: set[tuple[int, int]] = field(default_factory=set)  # from where avoiding was thought of
     told: set[str] = field(default_factory=set)  # outcomes that have been told
     covered: bool = False  # by the plan that is followed
-    settled: bool = False  # nothing more is to be done about it
+    settled: bool = False  # nothing more is to be done about it but to keep clear of it
 
 
 class Avoider:
     """Avoids what it is told of by :meth:`mind`."""
 
     name = "avoid"
-    layer = "avoidance"
 
     def __init__(
         self,
         search: AvoidanceSearch,
-        away: np.ndarray,
-        strikes: Strikes,
         tell: Callable[[Avoidance, Threat], None],
+        *,
+        reaction: float = 0.0,
+        away: np.ndarray | None = None,
     ) -> None:
-        """search: of a library's avoidance layer. away [F] rad: how far each frame is from where
-        the other controllers could go on. strikes: blows, which are not broken off once they are
-        driven home. tell: is told what each search comes to."""
-        self.search, self.tell, self._away = search, tell, away
-        self._enter = entries(search.library)
-        self._strikes = np.zeros(len(away), dtype=bool)
-        for start, lands in zip(strikes.start.tolist(), strikes.frame.tolist()):
-            self._strikes[start : lands + 1] = True
-        near, self._unlike = nearest(search.library)
-        self._like = search.library.table.last[near]
+        """search: of a library's avoidance layer. tell: is told what each search comes to.
+
+        reaction: s after which it knows of an attack that has begun, or of more of it. away [F]
+        rad: how far each frame is from where the controllers after it could go on; None: they go
+        on where an avoidance has ended.
+        """
+        self.search, self.tell, self.reaction, self._away = search, tell, reaction, away
+        self.layer = search.library.name
         self.start()
 
     def start(self) -> None:
         self.threats: list[Threat] = []
-        self.plan: Plan | None = None
-        self._next = 0  # of the plan's path
-        self._edge = NONE  # what it chose last, while that is played
+        self._unknown: list[tuple[float, Threat]] = []  # and from when on each is known
+        self._forget_plan()
 
-    def mind(self, attack: Attack, number: int, name: str) -> None:
-        """Know of an attack from now on. name: of what attacks."""
-        self.threats.append(Threat(attack, number, name))
+    @property
+    def watches(self) -> bool:
+        return bool(self.threats or self._unknown) or self.plan is not None
+
+    # What comes ----------------------------------------------------------------------------------
+
+    def mind(
+        self,
+        attack: Attack,
+        number: int,
+        now: float,
+        *,
+        ball: str | None = None,
+        attacker: str | None = None,
+        avoid: bool = True,
+    ) -> None:
+        """An attack begins, or more of it can be seen at a time [s]: one of the same number is
+        replaced. It is known a reaction later.
+
+        ball: the thing that is thrown; attacker: whose blow it is. avoid: it is got out of the way
+        of; else it is something that an avoidance must keep clear of.
+        """
+        seen = Threat(attack, number, ball, attacker, settled=not avoid)
+        self._unknown = [(w, t) for w, t in self._unknown if t.attack.when[-1] >= now]
+        self._unknown.append((now + self.reaction, seen))
 
     def forget(self, number: int) -> None:
         """An attack is over."""
         self.threats = [t for t in self.threats if t.number != number]
+        self._unknown = [(w, t) for w, t in self._unknown if t.number != number]
+
+    def _learn(self, now: float) -> None:
+        """Know what is known from now on, and forget what is over."""
+        threats = {t.number: t for t in self.threats}
+        for _, seen in [u for u in self._unknown if u[0] <= now + 1e-9]:
+            if seen.number in threats:
+                seen.told = threats[seen.number].told
+            threats[seen.number] = seen
+        self._unknown = [u for u in self._unknown if u[0] > now + 1e-9]
+        self.threats = [t for t in threats.values() if t.attack.when[-1] >= now]
+
+    # The controller ------------------------------------------------------------------------------
 
     def watch(self, view: View) -> int | None:
-        now = view.seconds
-        self.threats = [t for t in self.threats if t.attack.when[-1] >= now]
+        self._learn(view.seconds)
+        if self.plan is not None and not self._goes_on(view):
+            self._forget_plan()
         if not view.free:
             return None
         k, cast = view.me, view.cast
-        frame = int(cast.frame[k])
+        frame, stop = int(cast.frame[k]), int(cast.stop[k])
+        edge = self._edge_of(view)
+        if edge != NONE:
+            if self._find(view, standing(cast, k, stop, edge), stop):
+                return stop
+            return self._hands_over(frame)
         if self.plan is not None:
-            # What it minded is over: from here the others go on, if what is shown lets them.
-            minded = any(t.covered for t in self.threats)
-            if minded or self._edge == NONE or self._away[frame] > NEAR:
-                return None
-            self._next = len(self.plan.path)
-            return frame
-        ahead = frame + int(cast.fraction[k] > 0.0)
-        if self._strikes[frame]:
+            return None
+        search, here = self.search, frame + int(cast.fraction[k] > 0.0)
+        if not self._unseen(view.seconds) or search.strikes[frame]:
             return None  # a blow that is driven home is not broken off
-        state = int(self._enter[ahead]) if ahead < len(self._enter) else NO_STATE
-        comes_past = state != NO_STATE and state <= cast.stop[k]
+        state = int(search.entries[here]) if here < len(search.entries) else NO_STATE
+        comes_past = state != NO_STATE and state <= stop
         soon = comes_past and state - frame <= SOON * view.fps
-        if soon and self._search(view, standing(cast, k, state)):
+        if soon and self._find(view, standing(cast, k, state), state):
             return state
-        here = joined(cast, k, int(self._like[frame]))
-        if self._unlike[frame] <= WORST and self._search(view, here):
+        like, unlike = search.nearest
+        if unlike[frame] <= WORST and self._find(view, joined(cast, k, int(like[frame])), frame):
             return frame
-        if comes_past and self._search(view, standing(cast, k, state)):
+        if comes_past and self._find(view, standing(cast, k, state), state):
             return state
         return None
 
     def choose(self, view: View) -> int:
+        if self.plan is not None and not self._goes_on(view):
+            self._forget_plan()
         if self.plan is None:
             return PASS
         if self._next == len(self.plan.path):  # it is out of the way of what it minded
-            self.plan = None
-            for t in self.threats:
-                t.covered = False
-            k, stop, edge = view.me, int(view.cast.stop[view.me]), self._edge
-            self._edge = NONE
-            ended = self.search.state_at(stop) != NONE
-            here = (
-                standing(view.cast, k, stop, edge)
-                if ended
-                else joined(view.cast, k, int(self._like[stop]))
-            )
-            if not self._search(view, here):
+            edge, k, stop = self._edge_of(view), view.me, int(view.cast.stop[view.me])
+            self._forget_plan()
+            if self.search.state_at(stop) != NONE:
+                here = standing(view.cast, k, stop, edge)
+            else:  # it has handed over within an edge
+                here = joined(view.cast, k, int(self.search.nearest[0][stop]))
+            if not self._find(view, here, stop):
                 return PASS
         assert self.plan is not None
         self._edge = self.plan.path[self._next]
@@ -139,42 +170,86 @@ class Avoider:
         return frames
 
     def interrupted(self, view: View) -> None:
-        self.plan, self._edge = None, NONE
+        self._forget_plan()
         for t in self.threats:
-            t.covered, t.tried = False, set()
+            t.tried = set()
 
-    def _search(self, view: View, where: Standing) -> bool:
-        """Look for a way out from a state ahead; whether there is a plan now.
+    # Searching -----------------------------------------------------------------------------------
 
-        From one state the same would be found, so each attack is thought about there once.
-        """
-        state = where.stop
-        now = view.seconds
-        soon = [
+    @property
+    def rest(self) -> tuple[int, ...]:
+        """What of the plan's path has not begun: stretches."""
+        return () if self.plan is None else self.plan.path[self._next :]
+
+    def _edge_of(self, view: View) -> int:
+        """The stretch of the avoidance layer that its character plays, or NONE."""
+        if view.span == NO_SPAN:
+            return NONE
+        layer, stretch = view.spans.stretch(view.span)
+        return stretch if layer == self.layer else NONE
+
+    def _goes_on(self, view: View) -> bool:
+        """Whether its character does what the plan counts on: a controller before it may have done
+        something else meanwhile."""
+        if self._edge == NONE:  # the path has not begun: it does where that edge ends
+            return int(view.cast.stop[view.me]) == self._from
+        return view.span == view.spans.span(self.layer, self._edge)
+
+    def _hands_over(self, frame: int) -> int | None:
+        """Where what it avoids is over and those after it could go on from here: here."""
+        if self.plan is None or self._edge == NONE or self._away is None:
+            return None
+        if any(t.covered for t in self.threats) or self._away[frame] > NEAR:
+            return None
+        self._next = len(self.plan.path)
+        return frame
+
+    def _forget_plan(self) -> None:
+        self.plan: Plan | None = None
+        self._next = 0  # of the plan's path
+        self._edge = NONE  # what it chose last, while that is played
+        self._from = NO_STATE  # the frame after which its path begins
+        for t in self.threats:  # what is still to come is thought about anew
+            t.covered = False
+
+    def _unseen(self, now: float) -> list[Threat]:
+        """What is to be thought about: what is not seen to, and near enough."""
+        return [
             t
             for t in self.threats
-            if not (t.covered or t.settled)
-            and state not in t.tried
-            and t.attack.when[-1] - now < SOONEST
+            if not (t.covered or t.settled) and t.attack.when[-1] - now < SOONEST
         ]
+
+    def _find(self, view: View, where: Standing, leave: int) -> bool:
+        """Look for a way out from where its character will be, having left what it plays at a
+        library frame; whether there is a new plan.
+
+        Whatever it plays, from one state the same would be found: each attack is thought about
+        there once.
+        """
+        now, key = view.seconds, (view.begun, where.stop)
+        soon = [t for t in self._unseen(now) if key not in t.tried]
         if not soon:
             return False
         threat = min(soon, key=lambda t: t.attack.when[-1])
-        threat.tried.add(state)
+        threat.tried.add(key)
         attacks = [threat.attack, *(t.attack for t in self.threats if t is not threat)]
         found = self.search.search(where, attacks, now)
         if found.outcome not in threat.told or found.outcome == Outcome.FOUND:
             threat.told.add(found.outcome)
             self.tell(found, threat)
+        # Wide of where it is may be right where it goes next; too late remains so.
         threat.settled = found.outcome == Outcome.LATE
         if found.plan is None:
             return False
-        self.plan, self._next, threat.covered = found.plan, 0, True
+        self.plan, self._next, self._edge, self._from = found.plan, 0, NONE, leave
+        threat.covered = True
         return True
 
 
 def standing(cast: Cast, k: int, stop: int, stretch: int = NONE) -> Standing:
-    """Where character k is, on its way to library frame ``stop``."""
+    """Where character k is, on its way to library frame ``stop``; stretch: of the avoidance layer,
+    if it plays one."""
     return Standing(
         cast.anchor[k].copy(),
         float(np.minimum(cast.frame[k] + cast.fraction[k], stop)),

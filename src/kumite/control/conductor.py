@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from kumite.control.protocol import PASS, SELF, Called, Controller, External, View
+from kumite.control.protocol import NO_SPAN, PASS, SELF, Called, Controller, External, View
 from kumite.errors import KumiteError, unknown
 from kumite.graph import Layer
 from kumite.graph.spans import Spans
@@ -23,6 +23,7 @@ from kumite.synthesis import Cast
 from kumite.synthesis.rates import FASTEST, SLOWEST
 
 MOST_AT_ONCE = 8  # spans that one may begin in one frame
+DRAWS = 7  # names the streams of random numbers of controllers among all of a seed
 
 
 class ControllerError(KumiteError):
@@ -63,14 +64,23 @@ class Conductor:
         self.opponent, self.controllers = opponent, controllers
         self.fps = cast.library.clips.fps
         self.frame = 0  # of the scene, now
-        self.charge = [0] * len(self.names)
         self._begin, self._free, self._chooses = begin, free, chooses
         self._begin_many = begin_many
 
-    def start(self) -> None:
-        """A scene begins, or begins again: everybody has been placed."""
+    def start(self, seed: int = 0, spans: Sequence[int] | None = None) -> None:
+        """A scene begins, or begins again, with a seed: everybody has been placed.
+
+        spans [K]: at whose ends; None: of none.
+        """
+        count = len(self.names)
         self.frame = 0
-        self.charge = [0] * len(self.names)
+        self.charge = [0] * count
+        self.span = np.full(count, NO_SPAN)  # that each plays …
+        if spans is not None:
+            self.span[:] = spans
+        self.begun = np.zeros(count, dtype=np.int64)  # … and the frame in which it was begun
+        self._seed = seed
+        self._rng: dict[int, np.random.Generator] = {}  # of those who have looked
         for controllers in self.controllers:
             for controller in controllers:
                 if not callable(controller):
@@ -101,9 +111,12 @@ class Conductor:
 
     def view(self, k: int) -> View:
         """What the controllers of character k may know now."""
+        if k not in self._rng:
+            self._rng[k] = np.random.default_rng([self._seed, k, DRAWS])
         return View(
-            k, self.frame, self.fps, self.names, self.opponent, self.cast, self.spans, self._free(k)
-        )
+            k, self.frame, self.fps, self.names, self.opponent, self.cast, self.spans,
+            self._free(k), int(self.span[k]), int(self.begun[k]), self._rng[k],
+        )  # fmt: skip
 
     def step(self, frame: int, choices: Mapping[str, int] | None = None) -> None:
         """Controllers see a frame of the scene and choose where an action ends, before anybody
@@ -147,6 +160,7 @@ class Conductor:
             begun = True
             self.charge[k] = n
             self._begin(k, span, _GIVEN if k in given else controllers[n])
+            self.span[k], self.begun[k] = NO_SPAN if span == SELF else span, self.frame
             if controllers:
                 self._set_rate(k, self.view(k))
         for many in together.values():
@@ -154,6 +168,7 @@ class Conductor:
             controller, who = self.controllers[many[0]][0], np.array(many)
             spans = controller.choose_many(who)  # pyright: ignore[reportAttributeAccessIssue]
             self._begin_many(who, spans, controller)
+            self.span[who], self.begun[who] = spans[who], self.frame
             begun = True
         return begun
 
@@ -181,6 +196,7 @@ class Conductor:
         for n in range(len(self.controllers[k])):
             self._ask(k, n, "interrupted", view)
         self.charge[k] = max(len(self.controllers[k]) - 1, 0)
+        self.span[k], self.begun[k] = NO_SPAN, self.frame
         self._set_rate(k, view)
 
     def _watch(self, k: int, controllers: Sequence[Controller]) -> None:

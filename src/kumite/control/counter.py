@@ -6,6 +6,7 @@ avoidance parts.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,8 @@ import numpy as np
 from kumite.body import lay_body
 from kumite.clip import LIMBS, tip_positions
 from kumite.control.avoidance import NONE, AvoidanceSearch, Standing, _now
+from kumite.control.avoider import standing
+from kumite.control.protocol import NO_SPAN, PASS, Plain, View
 from kumite.kernels import counter as kernels
 from kumite.kernels import paths
 from kumite.rotation import planar_compose
@@ -23,6 +26,8 @@ NEARLY = 0.03  # m by which it may miss: whoever is hit moves
 HASTE = 0.15  # m of depth that a second of waiting is worth
 ROOM = 0.55  # m between two pelvises that a path must leave where it ends
 TRIED = 16  # of the best paths that are looked at for room
+BOLDNESS = 1.0  # s after an avoided blow in which there is time to strike back
+SAFE = 0.25  # s between a blow back and the next blow that may come
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,16 @@ class Counter:
     blow: int  # of the library's strikes
     gap: float  # m between fist and skin at their nearest, below 0 inside
     seconds: float  # from now until then
+
+
+@dataclass(frozen=True)
+class Opening:
+    """Whom a blow back may be meant for, as far as is known what that one does."""
+
+    goal: np.ndarray  # [T, M, 3] m: where M parts of its body are at frames 0.. from now
+    radius: np.ndarray  # [M] m, of these
+    body: np.ndarray  # [T, 3] m: its pelvis
+    until: float  # s of the scene at which the next blow may come
 
 
 class CounterSearch:
@@ -132,6 +147,58 @@ class CounterSearch:
         for stretch in path:
             here = planar_compose(here, library.table.displacement[stretch])
         return here[:2]
+
+
+class CounterFighter(Plain):
+    """A controller that strikes back for a while after a blow has been avoided."""
+
+    name = "counter"
+
+    def __init__(
+        self,
+        search: CounterSearch,
+        opening: Callable[[int], Opening],
+        tell: Callable[[int, Counter], None],
+    ) -> None:
+        """opening(k): whom character k may strike. tell(k, counter): is told what it does."""
+        self.search, self.opening, self.tell = search, opening, tell
+        self.layer = search.search.library.name
+        self.start()
+
+    def start(self) -> None:
+        self._bold = -np.inf  # s until which it strikes back
+        self._rest: list[int] = []  # stretches of a blow that has begun
+        self._span = NO_SPAN  # that it chose last
+
+    def avoided(self, now: float) -> None:
+        """A blow has been avoided."""
+        self._bold = now + BOLDNESS
+
+    def choose(self, view: View) -> int:
+        if view.span != self._span:  # somebody else has chosen meanwhile
+            self._rest = []
+        if not self._rest and view.seconds <= self._bold:
+            self._rest = self._find(view)
+        if not self._rest:
+            self._span = NO_SPAN
+            return PASS
+        self._span = view.spans.span(self.layer, self._rest.pop(0))
+        return self._span
+
+    def interrupted(self, view: View) -> None:
+        self._rest = []
+
+    def _find(self, view: View) -> list[int]:
+        """The stretches of a blow that meets somebody before the next can come, if there is one."""
+        k, now, seen = view.me, view.seconds, self.opening(view.me)
+        layer, edge = view.spans.stretch(view.span) if view.span != NO_SPAN else ("", NONE)
+        here = standing(view.cast, k, int(view.cast.stop[k]), edge if layer == self.layer else NONE)
+        found = self.search.find(here, seen.goal, seen.radius, seen.body)
+        if found is None or seen.until < now + found.seconds + SAFE:
+            return []
+        self._bold = -np.inf
+        self.tell(k, found)
+        return list(found.path)
 
 
 def _goes_on(first: np.ndarray, last: np.ndarray) -> np.ndarray:

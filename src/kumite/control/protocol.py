@@ -19,6 +19,7 @@ from kumite.synthesis import Cast
 
 PASS = -1  # chosen by a controller that leaves it to the next
 SELF = -2  # chosen by a controller that poses its character itself, until another breaks that off
+NO_SPAN = -1  # where a character plays nothing that a controller chose
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,9 @@ class View:
     cast: Cast  # who is where, and what each plays
     spans: Spans  # what may be chosen
     free: bool  # neither moved by physics nor in a reaction: it may break off what it does
+    span: int  # that it plays, NO_SPAN after its place or what it does was given it otherwise …
+    begun: int  # … and the frame in which it began it
+    rng: np.random.Generator  # its own: what it draws changes nobody else's luck
 
     @property
     def seconds(self) -> float:
@@ -60,7 +64,8 @@ class Controller(Protocol):
 
     def watch(self, view: View) -> int | None:
         """See a frame, before anybody moves. The library frame, ahead in what is played, at which
-        it is to be broken off, for this controller to choose; None: it may go on."""
+        it is to be broken off, for this controller to choose; None: it may go on. At its end: this
+        controller chooses there, and until then how fast it is played."""
         ...
 
     def choose(self, view: View) -> int:

@@ -16,6 +16,7 @@ from kumite.body import Body, Spheres, limb_spheres, strikes_with
 from kumite.clip import LIMBS, forward_kinematics
 from kumite.control import Fighters, Skill, approach, stretch_tracks, strike, trained
 from kumite.control.attack import Attack, from_limbs
+from kumite.control.protocol import Plain, View
 from kumite.errors import KumiteError
 from kumite.graph import Layer
 from kumite.kernels.blow import NO_BLOW
@@ -53,17 +54,24 @@ def skill_of(
     return Skill(library, policies[0], policies[1], tracks)
 
 
-class Attackers:
-    """A characters who attack, as a cast of their own library."""
+class Attackers(Plain):
+    """A characters who attack, as a cast of their own library, and the controller of them all."""
 
-    def __init__(self, skill: Skill, settings: Sequence[AttackerSettings], seed: int) -> None:
-        self.skill, self.library = skill, skill.library
+    name = "policy"
+
+    def __init__(self, skill: Skill, settings: Sequence[AttackerSettings]) -> None:
+        """They take their places by :meth:`place`."""
+        self.skill, self.library, self._settings = skill, skill.library, settings
         self.fps = self.library.clips.fps
-        self.cast = Cast(self.library, len(settings))
-        self.fighters = Fighters(skill, [s.temper() for s in settings], seed)
         self._alone = Cast(self.library, 1)
         skeleton = self.library.clips.skeleton
         self._spheres = [limb_spheres(skeleton, strikes_with(skeleton, limb)) for limb in LIMBS]
+
+    def place(self, seed: int) -> None:
+        """Everybody takes their place, with a seed."""
+        settings = self._settings
+        self.cast = Cast(self.library, len(settings))
+        self.fighters = Fighters(self.skill, [s.temper() for s in settings], seed)
         rng = np.random.default_rng([seed, 2])
         # Everyone starts in a state with many ways out: the usual guard, not the end of a blow.
         ways = np.diff(self.library.table.action_start)
@@ -106,11 +114,9 @@ class Attackers:
             jump=bool(table.first[stretch] != cast.stop[k] + 1),
         )
 
-    def begin(self, k: int) -> int:
-        """Character k takes what it has decided on; the stretch."""
-        chosen = np.full(self.cast.count, self.next[k])
-        self.cast.begin(np.array([k]), chosen)
-        return int(self.next[k])
+    def choose(self, view: View) -> int:
+        """What was decided on, an action ago."""
+        return view.spans.span(self.library.name, int(self.next[view.me]))
 
     def foresee(self, k: int, frame: int) -> list[Blow]:
         """Blows of character k that have not been told of, or of which more is known than was.

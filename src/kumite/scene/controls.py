@@ -136,7 +136,10 @@ HEAVIEST = 10.0
 class Searching(Protocol):
     """A scene in which somebody avoids."""
 
-    search: AvoidanceSearch
+    @property
+    def search(self) -> AvoidanceSearch:
+        """What they search with now."""
+        ...
 
     def tune(self, **rules: object) -> None:
         """Other rules for the next searches."""

@@ -7,21 +7,26 @@ import numpy as np
 from kumite.body import lay_body
 from kumite.control.attack import Attack, thrown
 from kumite.control.avoidance import AvoidanceSearch, Outcome
+from kumite.control.avoider import standing
+from kumite.control.protocol import Controller
 from kumite.errors import KumiteError
 from kumite.graph import Layer, Library
+from kumite.scene.avoiding import Avoiders, search_of
 from kumite.scene.balls import Balls
 from kumite.scene.controls import SearchControl, search_controls
-from kumite.scene.dodgers import Dodgers, background, volume_of
 from kumite.scene.doors import check_scene
 from kumite.scene.events import Event, Searched
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.settings_dodge import BallsSettings, DodgeSettings
 from kumite.scene.stage import SceneObject
 from kumite.scene.throwing import Throwing
+from kumite.synthesis import Cast
 
 
 class DodgeScene:
-    """Dodgers under fire, one frame at a step. The same seed gives the same frames.
+    """People under fire, one frame at a step. The same seed gives the same frames.
+
+    ``controllers`` [K] are those of each character, in order (:mod:`kumite.control.protocol`).
 
     Follows the :class:`~kumite.scene.stage.Stage` protocol, so the studio can show it.
     """
@@ -37,35 +42,31 @@ class DodgeScene:
         self.names = tuple(d.name for d in settings.dodging)
         self.dodge = settings.dodge or DodgeSettings()
         self.balls_settings = settings.balls or BallsSettings()
-        volume = volume_of(self.dodge, library.clips.skeleton)
-        self.search = AvoidanceSearch(library, self.dodge.search(), spheres=volume)
-        _ = self.search.masks, self.search.index  # made now, not at the first throw
+        search = search_of(library, self.dodge)
+        self.side = Avoiders(search, settings.dodging, self._tell)
         self._streams: bool | None = None  # None: as many throws as the settings say
         self.body = lay_body(self.skeleton)
         self.reset(seed)
-        background().submit(self._search_once).result()
+        self._search_once()
 
     def _search_once(self) -> None:
         """What first searches would compile or load must not hold up a picture."""
         goal, yaw = self.root_position[0], self.cast.facing[0, 2]
         before = np.array([np.sin(yaw), 0.0, np.cos(yaw)])
         attack = thrown(goal + 4.0 * before, -8.0 * before, 0.1, gravity=0.0, seconds=1.0)
-        standing, parts = self.dodgers.standing(0), self.search.graph.part_of
+        cast, parts = self.cast, self.search.graph.part_of
+        here = standing(cast, 0, int(cast.stop[0]), self.side.conductor.span[0])
         for attacks in ([attack], [attack, attack]):  # arrays of other kinds
-            self.search.search(standing, attacks, 0.0)
+            self.search.search(here, attacks, 0.0)
         edge = int(np.flatnonzero(np.diff(parts))[0])
-        self.search.timed(standing, (edge,), int(parts[edge]), 1.0, 0.0)
+        self.search.timed(here, (edge,), int(parts[edge]), 1.0, 0.0)
 
     def reset(self, seed: int) -> None:
         """Start again from the beginning, with a seed."""
         self.seed = int(seed)
         self.frame = 0
         self.events: list[Event] = []
-        homes = np.array([[*d.position, np.radians(d.yaw_deg)] for d in self.settings.dodging])
-        rng = np.random.default_rng(self.seed)
-        self.dodgers = Dodgers(
-            self.search, self.names, homes, rng, self._tell, latency=self.dodge.latency
-        )
+        self.side.start(self.seed)
         self.throwing = Throwing(
             self.balls_settings,
             self.cast,
@@ -75,15 +76,24 @@ class DodgeScene:
             list(range(len(self.names))),
             self.names,
             self._mind,
-            self.dodgers.forget,
+            self.side.forget,
             self._tell,
         )
         if self._streams is not None:
             self.throwing.streams = self._streams
 
     @property
-    def cast(self):
-        return self.dodgers.cast
+    def cast(self) -> Cast:
+        return self.side.cast
+
+    @property
+    def search(self) -> AvoidanceSearch:
+        """What all who avoid search with."""
+        return self.side.search
+
+    @property
+    def controllers(self) -> list[list[Controller]]:
+        return self.side.controllers
 
     @property
     def root_position(self) -> np.ndarray:
@@ -109,8 +119,7 @@ class DodgeScene:
         """Other rules for the next searches; those under way keep theirs. Errors: values that are
         not allowed, or rules that cannot change.
         """
-        self.search = self.search.tuned(**rules)
-        self.dodgers.search = self.search
+        self.side.tune(**rules)
 
     @property
     def balls(self) -> Balls:
@@ -135,7 +144,7 @@ class DodgeScene:
         at: int = 0,
         radius: float | None = None,
     ) -> None:
-        """Throw a ball (:meth:`Throwing.throw`). at: the dodger who is to mind it."""
+        """Throw a ball (:meth:`Throwing.throw`). at: who is to mind it."""
         self.throwing.throw(self.frame, position, goal, speed, at, radius)
 
     def throw_one(self, speed: float | None = None, radius: float | None = None) -> None:
@@ -143,16 +152,18 @@ class DodgeScene:
         self.throwing.throw_one(self.frame, speed, radius)
 
     def step(self) -> bool:
-        """One frame: throws that are due, searches and edges, balls and what they meet."""
+        """One frame: throws that are due, controllers decide, all move, balls and what they
+        meet."""
         self.throwing.due(self.frame)
-        self.dodgers.step(self.frame)
+        self.side.conductor.step(self.frame)
+        self.cast.advance()
         self.frame += 1
         self.throwing.step(self.frame)
         return True
 
     def _mind(self, k: int, attack: Attack, number: int, ball: str) -> None:
         if self.dodge.searches:
-            self.dodgers.menace(k, attack, number, ball=ball)
+            self.side.avoiders[k].mind(attack, number, self.frame / self.fps, ball=ball)
 
     def _tell(self, event: Event) -> None:
         if isinstance(event, Searched) and event.outcome == Outcome.FOUND:

@@ -17,28 +17,29 @@ from kumite.body import ARMS
 from kumite.body.spheres import SWORD
 from kumite.clip import LIMBS, Skeleton
 from kumite.control.attack import Attack
-from kumite.control.avoidance import AvoidanceSearch
-from kumite.control.counter import CounterSearch
+from kumite.control.conductor import Conductor
+from kumite.control.counter import Counter, CounterFighter, CounterSearch, Opening
+from kumite.control.protocol import Controller
 from kumite.errors import KumiteError
 from kumite.graph import Layer, Library
+from kumite.graph.spans import Spans
+from kumite.kernels.blow import NOBODY
 from kumite.rotation import planar_apply, wrap_angle
 from kumite.scene import events
 from kumite.scene.apart import held_apart, push_two
 from kumite.scene.attackers import Attackers, Blow, middle_of, skill_of
+from kumite.scene.avoiding import Avoiders, search_of
 from kumite.scene.blows import Blows, Contact
-from kumite.scene.dodgers import Dodgers, volume_of
 from kumite.scene.doors import check_scene, layer_of
-from kumite.scene.events import Avoided, Counter, Event, Foreseen, Hit
+from kumite.scene.events import Avoided, Event, Foreseen, Hit
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.settings_dodge import DodgeSettings
 from kumite.scene.stage import SceneObject
 from kumite.synthesis import Cast
 from kumite.synthesis.recoil import RECOIL
 
-ANTICIPATION = 0.4  # s of a dodger's motion that an attacker foresees; then it takes it to stand
-NEAR = 2.0  # m from a dodger within which a blow that is meant for another menaces it, too
-BOLDNESS = 1.0  # s after an avoided blow in which there is time to strike back
-SAFE = 0.25  # s between a blow back and the next blow that may come
+ANTICIPATION = 0.4  # s of another's motion that an attacker foresees; then it takes it to stand
+NEAR = 2.0  # m from an avoider within which a blow that is meant for another menaces it, too
 GOALS = ("head", "chest")  # what blows back are meant for
 TRUNK = ("head", "chest", "pelvis")  # what of an attacker an avoidance must not run into …
 THIN = 0.12  # m, of the spheres there: arms may touch
@@ -83,8 +84,9 @@ class Everyone:
 
 
 class EvasionScene:
-    """Dodgers under attack, one frame at a step. The same seed gives the same frames.
+    """People under attack, one frame at a step. The same seed gives the same frames.
 
+    ``controllers`` [K] are those of each character, in order (:mod:`kumite.control.protocol`).
     Follows the :class:`~kumite.scene.stage.Stage` protocol, so the studio can show it.
     """
 
@@ -127,11 +129,27 @@ class EvasionScene:
             for name in side
         )
         self.dodge = settings.dodge or DodgeSettings()
-        volume = volume_of(self.dodge, library.clips.skeleton)
-        self.search = AvoidanceSearch(library, self.dodge.search(), spheres=volume)
-        _ = self.search.masks, self.search.index  # made now, not at the first blow
+        search = search_of(library, self.dodge)
         self.skill = skill_of(attack, cache, progress)
-        self._counters = CounterSearch(self.search) if self.dodge.counters else None
+        self.side = Avoiders(
+            search,
+            settings.dodging,
+            self._tell,
+            watched=lambda d: self.attackers.cast.root_position[self._foe(d), [0, 2]],
+            distance=self.dodge.distance,
+        )
+        self.attackers = Attackers(self.skill, settings.attacker)
+        self._counters: list[CounterFighter] = []
+        if self.dodge.counters:
+            blows = CounterSearch(search)
+            for controllers in self.side.controllers:
+                self._counters.append(CounterFighter(blows, self._opening, self._tell_counter))
+                controllers.insert(1, self._counters[-1])
+        self.controllers: list[list[Controller]] = [
+            *self.side.controllers,
+            *([self.attackers] for _ in settings.attacker),
+        ]
+        self._spans = Spans.of(Library.of(attack), (attack.name,))
         self.reset(seed)
 
     def reset(self, seed: int) -> None:
@@ -139,31 +157,42 @@ class EvasionScene:
         self.seed = int(seed)
         self.frame = 0
         self.events: list[Event] = []
-        homes = np.array([[*d.position, np.radians(d.yaw_deg)] for d in self.settings.dodging])
-        rng, names = np.random.default_rng(self.seed), self.names[: self._dodgers_count]
-        self.dodgers = Dodgers(
-            self.search, names, homes, rng, self.events.append, latency=self.dodge.latency
+        self.side.start(self.seed)
+        self.attackers.place(self.seed)
+        cast = self.attackers.cast
+        self._conductor = Conductor(
+            cast,
+            self._spans,
+            self.names[self._dodgers_count :],
+            np.full(cast.count, NOBODY),
+            self.controllers[self._dodgers_count :],
+            begin=self._begin,
+            free=lambda k: True,
         )
-        self.dodgers.distance, self.dodgers.resolve = self.dodge.distance, self._strike_back
-        self.attackers = Attackers(self.skill, self.settings.attacker, self.seed)
-        self.cast = Everyone([self.dodgers.cast, self.attackers.cast])
-        self._sides = (Blows(self.dodgers.cast), Blows(self.attackers.cast))
+        self._conductor.start(self.seed)
+        self.cast = Everyone([self.side.cast, cast])
+        self._sides = (Blows(self.side.cast), Blows(cast))
         self._heads = middle_of(self.library, self._sides[0].body, "head")
         self._coming: dict[tuple[int, int, int], Coming] = {}
         self._numbers = 0
-        self._bold = np.full(self._dodgers_count, -np.inf)  # s until which each strikes back
-        for a in range(self.attackers.cast.count):
+        for a in range(cast.count):
             self._decide(a)
+
+    def _begin(self, a: int, span: int, controller: Controller) -> None:
+        """An attacker begins what it has decided on, and decides on what comes after it."""
+        cast = self.attackers.cast
+        cast.begin(np.array([a]), np.full(cast.count, span))
+        self._decide(a)
 
     @property
     def root_position(self) -> np.ndarray:
-        return np.concatenate([self.dodgers.cast.root_position, self.attackers.cast.root_position])
+        return np.concatenate([self.side.cast.root_position, self.attackers.cast.root_position])
 
     @property
     def wxyz(self) -> np.ndarray:
         out = np.zeros((len(self.names), len(self.skeleton), 4))
         out[..., 0] = 1.0
-        out[: self._dodgers_count, self._rows[0]] = self.dodgers.cast.wxyz
+        out[: self._dodgers_count, self._rows[0]] = self.side.cast.wxyz
         out[self._dodgers_count :, self._rows[1]] = self.attackers.cast.wxyz
         return out
 
@@ -175,16 +204,11 @@ class EvasionScene:
         """There are none."""
 
     def step(self) -> bool:
-        """One frame: minds are made up, searches and edges, all move, blows are tested."""
-        dodgers, attackers = self.dodgers, self.attackers
-        for a in attackers.cast.waiting.tolist():
-            attackers.begin(a)
-            self._decide(a)
-        for d in range(self._dodgers_count):
-            foe = self._foe(d)
-            dodgers.watched[d] = attackers.cast.root_position[foe, [0, 2]]
-        dodgers.step(self.frame)
-        attackers.cast.advance()
+        """One frame: controllers decide, all move, blows are tested."""
+        self._conductor.step(self.frame)
+        self.side.conductor.step(self.frame)
+        self.side.cast.advance()
+        self.attackers.cast.advance()
         self._keep_apart()
         self.frame += 1
         for side, begun in enumerate([s.step() for s in self._sides]):
@@ -200,18 +224,18 @@ class EvasionScene:
     # Who minds whom ------------------------------------------------------------------------------
 
     def _foe(self, d: int) -> int:
-        """The attacker nearest to a dodger."""
-        off = self.attackers.cast.root_position - self.dodgers.cast.root_position[d]
+        """The attacker nearest to a character who avoids."""
+        off = self.attackers.cast.root_position - self.side.cast.root_position[d]
         return int(np.argmin(np.hypot(off[:, 0], off[:, 2])))
 
     def _victim(self, a: int) -> int:
-        """The dodger nearest to an attacker."""
-        off = self.dodgers.cast.root_position - self.attackers.cast.root_position[a]
+        """The character who avoids nearest to an attacker."""
+        off = self.side.cast.root_position - self.attackers.cast.root_position[a]
         return int(np.argmin(np.hypot(off[:, 0], off[:, 2])))
 
     def _decide(self, a: int) -> None:
         """An attacker makes up its mind, and who may be struck sees what is coming."""
-        attackers, cast, clips = self.attackers, self.dodgers.cast, self.library.clips
+        attackers, cast, clips = self.attackers, self.side.cast, self.library.clips
         steps = np.arange(1, max(1, round(ANTICIPATION * self.fps)) + 1)
         frames = cast.frames_ahead(np.arange(cast.count), steps)  # [D, H]
         at = self._victim(a)
@@ -239,8 +263,8 @@ class EvasionScene:
         centre = self.attackers.parts_ahead(a, body, rows)
         when = (self.frame + np.arange(len(centre))) / self.fps
         attack = Attack(when, centre, np.full(len(rows), THIN), f"body of {a}")
-        for d in range(self._dodgers_count):
-            self.dodgers.menace(d, attack, -1 - a).settled = True  # nobody gets out of its way
+        for avoider in self.side.avoiders:  # nobody gets out of its way
+            avoider.mind(attack, -1 - a, self.frame / self.fps, avoid=False)
 
     def _menace(self, blow: Blow, at: int) -> None:
         """A blow has been foreseen, or more of it."""
@@ -250,7 +274,7 @@ class EvasionScene:
             self._numbers += 1
             known = self._coming[key] = Coming(self._numbers, blow, at)
         known.blow = blow
-        cast, spheres = self.dodgers.cast, self.search.spheres
+        cast, spheres = self.side.cast, self.side.search.spheres
         body = spheres.at(cast.position[at], cast.world_wxyz[at])
         known.gap = blow.attack.nearest(body, spheres.radius)
         attacker = self.names[self._dodgers_count + blow.who]
@@ -271,40 +295,38 @@ class EvasionScene:
         for d in range(self._dodgers_count):
             off = blow.attack.centre[..., [0, 2]] - cast.root_position[d, [0, 2]]
             if d == at or np.hypot(off[..., 0], off[..., 1]).min() < NEAR:
-                self.dodgers.menace(d, blow.attack, known.number, attacker=attacker)
+                self.side.avoiders[d].mind(
+                    blow.attack, known.number, self.frame / self.fps, attacker=attacker
+                )
 
-    def _strike_back(self, d: int) -> Sequence[int]:
-        """What a dodger who has just avoided a blow does about it: stretches, if anything."""
-        if self._counters is None or self.frame / self.fps > self._bold[d]:
-            return ()
+    def _opening(self, d: int) -> Opening:
+        """Whom a character who avoids may strike back: the nearest attacker."""
         foe, body = self._foe(d), self._sides[1].body
         rows = [body.part(part) for part in (*GOALS, "pelvis")]
         goal = self.attackers.parts_ahead(foe, body, rows)
         radius = 0.5 * (body.radius_start + body.radius_end)[rows]
-        found = self._counters.find(
-            self.dodgers.standing(d), goal[:, :-1], radius[:-1], goal[:, -1]
-        )
-        now = self.frame / self.fps
         following = min(
             [float(c.blow.attack.when[0]) for c in self._coming.values()],
-            default=now + self.attackers.known(foe),
+            default=self.frame / self.fps + self.attackers.known(foe),
         )
-        if found is None or following < now + found.seconds + SAFE:
-            return ()
-        self._bold[d] = -np.inf
+        return Opening(goal[:, :-1], radius[:-1], goal[:, -1], following)
+
+    def _tell(self, event: Event) -> None:
+        self.events.append(event)
+
+    def _tell_counter(self, d: int, found: Counter) -> None:
         limb = LIMBS[int(self.library.strikes.limb[found.blow])]
         self.events.append(
-            Counter(
+            events.Counter(
                 self.frame,
                 self.names[d],
-                victim=self.names[self._dodgers_count + foe],
+                victim=self.names[self._dodgers_count + self._foe(d)],
                 limb=limb,
                 blow=found.blow,
                 gap=found.gap,
                 seconds=found.seconds,
             )
         )
-        return found.path
 
     # Bodies and blows ----------------------------------------------------------------------------
 
@@ -321,7 +343,7 @@ class EvasionScene:
 
     def _strikes(self, side: int) -> bool:
         """Whether one side's blows count: arms of those who only avoid swing as if they struck."""
-        return side == 1 or self._counters is not None
+        return side == 1 or bool(self._counters)
 
     def _tell_strike(self, side: int, k: int, s: int, blow: int) -> None:
         coming = self._coming.get((k, s, blow)) if side == 1 else None
@@ -373,7 +395,7 @@ class EvasionScene:
             if coming.blow.attack.when[-1] > now + 1e-9:
                 continue
             del self._coming[key]
-            self.dodgers.forget(coming.number)
+            self.side.forget(coming.number)
             if not coming.landed:
                 attacker = self.names[self._dodgers_count + coming.blow.who]
                 self.events.append(
@@ -384,7 +406,8 @@ class EvasionScene:
                         attacker=attacker,
                     )
                 )
-                self._bold[coming.at] = now + BOLDNESS
+                if self._counters:
+                    self._counters[coming.at].avoided(now)
 
 
 def _shared(skeletons: Sequence[Skeleton]) -> tuple[Skeleton, list[np.ndarray]]:

@@ -12,6 +12,9 @@ FARTHEST = 1000.0  # m: recordings keep single precision
 Metres = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
 Name = Annotated[str, Field(min_length=1, max_length=60)]
 
+Reaction = Annotated[float, Field(ge=0, le=2, allow_inf_nan=False)]  # s …
+REACTION = 0.0  # … until one knows of an attack that has begun
+
 NEAREST = "nearest"  # of those who are after one, or of all
 ARENA = "arena"  # what its edge is called among the objects
 

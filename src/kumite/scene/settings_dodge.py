@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from kumite.control.rules import GRAVITY, AvoidanceRules, Temper
-from kumite.scene.settings_base import Finite, Metres, Name, Settings
+from kumite.scene.settings_base import REACTION, Finite, Metres, Name, Reaction, Settings
 from kumite.synthesis.rates import FASTEST
 
 STYLES = ("boxing", "sword")
@@ -22,6 +22,7 @@ class DodgerSettings(Settings):
     name: Name
     position: tuple[Metres, Metres]  # m, x and z
     yaw_deg: Finite = 0.0  # 0 faces +Z
+    reaction: Reaction = REACTION
 
 
 class DodgersSettings(Settings):
@@ -29,6 +30,7 @@ class DodgersSettings(Settings):
 
     count: Annotated[int, Field(ge=1, le=10_000)] = 9
     spacing: Annotated[Finite, Field(ge=1.0, le=50.0)] = 4.0  # m
+    reaction: Reaction = REACTION
 
     def dodgers(self) -> tuple[DodgerSettings, ...]:
         across = max(1, round(self.count**0.5))
@@ -40,6 +42,7 @@ class DodgersSettings(Settings):
                     self.spacing * (n % across - 0.5 * (across - 1)),
                     -self.spacing * (n // across - 0.5 * (rows - 1)),
                 ),
+                reaction=self.reaction,
             )
             for n in range(self.count)
         )
@@ -55,13 +58,19 @@ class DodgeSettings(Settings):
     timescale: Annotated[Finite, Field(ge=0)] = 1.0
     clearance: Annotated[Finite, Field(ge=0, le=1)] = 0.02  # m
     most: Annotated[Finite, Field(ge=1, le=FASTEST)] = 4.0
-    latency: Annotated[int, Field(ge=1, le=120)] = 1  # frames until a search is taken up
     spheres: str | None = None  # a file of the body's volume (kumite spheres); by default laid
     index: bool = True
     culling: bool = True
     searches: bool = True  # False: they only stand about
     counters: bool = True  # where a blow has been avoided, they strike back, if they have blows
     distance: Annotated[Finite, Field(ge=0.5, le=10)] = 1.0  # m kept to whoever attacks
+
+    @model_validator(mode="before")
+    @classmethod
+    def _old_keys(cls, told: object) -> object:
+        if isinstance(told, dict) and "latency" in told:
+            raise ValueError("latency is no more; expected reaction = 0.2, in s, of whoever avoids")
+        return told
 
     def search(self) -> AvoidanceRules:
         return AvoidanceRules(

@@ -13,7 +13,16 @@ from kumite.control.routes import CheckPoint, Route, line, spiral
 from kumite.control.rules import BOREDOM, DEEPEST, RESTLESSNESS, Player, Rules, Temper
 from kumite.control.styles import Style, style
 from kumite.errors import KumiteError
-from kumite.scene.settings_base import FARTHEST, Finite, Metres, Name, Positive, Settings
+from kumite.scene.settings_base import (
+    FARTHEST,
+    REACTION,
+    Finite,
+    Metres,
+    Name,
+    Positive,
+    Reaction,
+    Settings,
+)
 
 Controllers = Annotated[
     tuple[Literal["avoid", "prepare", "fight", "external"], ...], Field(min_length=1)
@@ -196,6 +205,7 @@ class FighterSettings(TreeSettings):
     yaw_deg: Finite = 0.0  # 0 faces +Z
     against: Name  # another character, or "nearest": of those who are after it
     controllers: Controllers = ("fight",)
+    reaction: Reaction = REACTION
 
     @model_validator(mode="after")
     def _controllers_are_all(self) -> Self:

@@ -10,7 +10,17 @@ from pydantic import AliasChoices, Field, model_validator
 from kumite.control.routes import Route
 from kumite.control.rules import Player, Temper
 from kumite.errors import KumiteError
-from kumite.scene.settings_base import FARTHEST, NEAREST, Finite, Metres, Name, Positive, Settings
+from kumite.scene.settings_base import (
+    FARTHEST,
+    NEAREST,
+    REACTION,
+    Finite,
+    Metres,
+    Name,
+    Positive,
+    Reaction,
+    Settings,
+)
 from kumite.scene.settings_fight import (
     Controllers,
     FighterSettings,
@@ -43,6 +53,7 @@ class CharacterSettings(Weights):
     fight: Annotated[TreeSettings | PolicySettings, Field(discriminator="by")] | None = None
     prepare: PreparesSettings | None = None
     engage: Positive = 3.0  # m at which a fight begins, where others are heard in between
+    reaction: Reaction = REACTION
 
     @model_validator(mode="after")
     def _controllers_fit(self) -> CharacterSettings:
@@ -121,6 +132,7 @@ class Person:
     fight: TreeSettings | Weights | None  # how it fights
     goes_to: tuple[str, ...]  # what it prepares for
     engage: float = 3.0  # m at which its fights begin, where other controllers come after them
+    reaction: float = REACTION  # s until it knows of an attack that has begun
 
     @property
     def by_tree(self) -> bool:
@@ -151,10 +163,13 @@ def of_character(c: CharacterSettings) -> Person:
     fight = (c if c.fight is None else c.fight) if fights else None
     goes_to = c.prepare.goes_to if c.prepare else ()
     return Person(
-        c.name, c.position, c.yaw_deg, c.against, c.team, c.controllers, fight, goes_to, c.engage
-    )
+        c.name, c.position, c.yaw_deg, c.against, c.team, c.controllers, fight, goes_to, c.engage,
+        c.reaction,
+    )  # fmt: skip
 
 
 def of_fighter(f: FighterSettings) -> Person:
     """A ``[[fighter]]``."""
-    return Person(f.name, f.position, f.yaw_deg, f.against, None, f.controllers, f, ())
+    return Person(
+        f.name, f.position, f.yaw_deg, f.against, None, f.controllers, f, (), reaction=f.reaction
+    )

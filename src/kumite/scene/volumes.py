@@ -6,14 +6,17 @@ body was as the avoidance part began, and no longer is.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 
+from kumite.body import Spheres
 from kumite.control.attack import Attack
-from kumite.control.avoidance import AvoidanceSearch, Plan, Standing
+from kumite.control.avoidance import AvoidanceSearch, Standing
+from kumite.control.avoider import Avoider, standing
 from kumite.rotation import planar_apply, planar_compose, planar_inverse
-from kumite.scene.dodgers import Dodgers
+from kumite.synthesis import Cast
 
 MOST_SAMPLES = 60  # of an attack that are shown
 
@@ -25,15 +28,14 @@ class Volume(NamedTuple):
     radius: np.ndarray  # [N] m
 
 
-def body_volume(dodgers: Dodgers, k: int) -> Volume:
+def body_volume(cast: Cast, k: int, spheres: Spheres) -> Volume:
     """The spheres of character k's body now."""
-    cast, spheres = dodgers.cast, dodgers.search.spheres
     return Volume(spheres.at(cast.position[k], cast.world_wxyz[k]), spheres.radius)
 
 
-def attacks_on(dodgers: Dodgers) -> dict[int, Attack]:
+def attacks_on(avoiders: Iterable[Avoider]) -> dict[int, Attack]:
     """The attacks that anybody still minds, by their numbers."""
-    return {m.number: m.attack for mind in dodgers.minds for m in mind.menaces}
+    return {t.number: t.attack for avoider in avoiders for t in avoider.threats}
 
 
 def attack_volume(attack: Attack) -> Volume:
@@ -43,18 +45,12 @@ def attack_volume(attack: Attack) -> Volume:
     return Volume(attack.centre[some].reshape(-1, 3), np.tile(attack.radius, count))
 
 
-def followed(dodgers: Dodgers, k: int) -> Plan | None:
-    """The plan that character k follows, while it still avoids."""
-    return dodgers.minds[k].plan
-
-
-def avoidance_volume(dodgers: Dodgers, k: int) -> Volume:
+def avoidance_volume(cast: Cast, k: int, avoider: Avoider) -> Volume:
     """The avoidance volume of the plan that character k follows; no spheres without one."""
-    mind = dodgers.minds[k]
-    if mind.plan is None:
+    if avoider.plan is None:
         return Volume(np.zeros((0, 3)), np.zeros(0))
-    rest = mind.plan.path[mind.next_edge :]
-    return left_behind(dodgers.search, dodgers.standing(k), rest, mind.plan.part)
+    here = standing(cast, k, int(cast.stop[k]))
+    return left_behind(avoider.search, here, avoider.rest, avoider.plan.part)
 
 
 def left_behind(

@@ -16,7 +16,8 @@ import numpy as np
 from kumite.body import ARMS
 from kumite.clip import LIMBS
 from kumite.control import Behaviour, Progress, Route
-from kumite.control.avoidance import Avoidance, AvoidanceSearch, Outcome
+from kumite.control.attack import Attack
+from kumite.control.avoidance import Avoidance, Outcome
 from kumite.control.avoider import Avoider, Threat
 from kumite.control.conductor import Conductor, ControllerError
 from kumite.control.engage import Engage
@@ -29,8 +30,8 @@ from kumite.kernels.blow import NOBODY
 from kumite.kernels.moves import FALL, NOTHING
 from kumite.scene import events
 from kumite.scene.apart import push_apart
+from kumite.scene.avoiding import search_of, searched
 from kumite.scene.controls import OrderControl
-from kumite.scene.dodgers import searched, volume_of
 from kumite.scene.doors import check_scene, check_settings
 from kumite.scene.events import Cue, Event, Hit, RunOver
 from kumite.scene.floor import Floor, Landing
@@ -196,16 +197,14 @@ class World:
         if self.fight is not None:
             going_on = np.flatnonzero(np.isin(self.fight.tree.kinds, CALM))
         _, away = nearest(self.library, going_on)
-        dodge = self.settings.dodge or DodgeSettings()
-        search = AvoidanceSearch(avoidance, dodge.search(), spheres=volume_of(dodge, self.skeleton))
-        _ = search.masks, search.index  # made now, not at the first throw
-        for k, name in enumerate(self.names):
-            if name in self.settings.avoiding:
+        search = search_of(avoidance, self.settings.dodge or DodgeSettings())
+        for k, p in enumerate(self.settings.people):
+            if "avoid" in p.controllers:
                 self._avoiders[k] = Avoider(
                     search,
-                    away,
-                    self.library.strikes,
                     lambda found, threat, k=k: self._tell_search(k, found, threat),
+                    reaction=p.reaction,
+                    away=away,
                 )
 
     def reset(self, seed: int) -> None:
@@ -250,7 +249,7 @@ class World:
             chooses=lambda k: not (self._lies(k) or self._poses_itself(k)),
             begin_many=self._begin_many,
         )
-        self._conductor.start()
+        self._conductor.start(self.seed)
         self._posed_by = [0] * count  # the number of the controller that poses each, if one does
         if self._avoiders:
             self._throwing = Throwing(
@@ -261,7 +260,7 @@ class World:
                 self.seed,
                 sorted(self._avoiders),
                 self.names,
-                lambda k, attack, number, ball: self._avoiders[k].mind(attack, number, ball),
+                self._mind,
                 self._forget,
                 self.events.append,
             )
@@ -618,6 +617,10 @@ class World:
             )
         )
 
+    def _mind(self, k: int, attack: Attack, number: int, ball: str) -> None:
+        """Character k sees a ball coming."""
+        self._avoiders[k].mind(attack, number, self.frame / self.fps, ball=ball)
+
     def _forget(self, number: int) -> None:
         """What was thrown is over."""
         for avoider in self._avoiders.values():
@@ -626,9 +629,7 @@ class World:
     def _tell_search(self, k: int, found: Avoidance, threat: Threat) -> None:
         if found.outcome == Outcome.FOUND and self._throwing is not None:
             self._throwing.found(threat.number)
-        self.events.append(
-            searched(self.frame, self.names[k], found, threat.number, ball=threat.name)
-        )
+        self.events.append(searched(self.frame, self.names[k], found, threat))
 
     # The story -----------------------------------------------------------------------------------
 

@@ -59,14 +59,18 @@ class Volumes:
 
     def look(self) -> VolumePicture:
         """Under the lock: what is asked for, as it is now."""
-        shown, dodgers = self.shown, self.scene.dodgers
+        shown, side = self.shown, self.scene.side
         k = shown.who
-        plan = dodgers.minds[k].plan if shown.left else None
+        avoider = side.avoiders[k]
+        plan = avoider.plan if shown.left else None
+        new = plan is not None and plan is not self._plan
         return VolumePicture(
-            body_volume(dodgers, k) if shown.body else None,
-            dict(sorted(attacks_on(dodgers).items())[-MOST_ATTACKS:]) if shown.attacks else {},
+            body_volume(side.cast, k, side.search.spheres) if shown.body else None,
+            dict(sorted(attacks_on(side.avoiders).items())[-MOST_ATTACKS:])
+            if shown.attacks
+            else {},
             plan,
-            avoidance_volume(dodgers, k) if plan is not None and plan is not self._plan else None,
+            avoidance_volume(side.cast, k, avoider) if new else None,
         )
 
     def draw(self, picture: VolumePicture) -> None:
