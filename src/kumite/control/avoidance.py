@@ -12,7 +12,6 @@ import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import cos, pi, remainder, sin
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,7 +29,7 @@ from kumite.graph.spans import entries, nearest
 from kumite.kernels import avoid as kernels
 from kumite.kernels import cells, paths
 from kumite.kernels.joins import PLACES
-from kumite.rotation import planar_inverse
+from kumite.rotation import planar_compose_one, planar_inverse
 
 NONE = -1
 END_EFFECTORS = tuple(f"{side}_{part}" for part in ("hand", "foot") for side in SIDES)
@@ -258,7 +257,9 @@ class AvoidanceSearch:
 
         now: the scene's time [s] at which the character is where ``standing`` says.
         """
-        place = _beyond(standing.anchor, self.library.clips.facing[int(standing.phase)])[:2]
+        place = planar_compose_one(standing.anchor, self.library.clips.facing[int(standing.phase)])[
+            :2
+        ]
         attack = attacks[main]
         if attack.when[-1] <= now:
             return Avoidance(Outcome.LATE)
@@ -280,7 +281,7 @@ class AvoidanceSearch:
         if aim > s.ahead:
             return Avoidance(Outcome.EARLY, aim=aim)
         state = self.state_at(present.stop)
-        facing = _beyond(standing.anchor, self.library.clips.facing[present.stop])
+        facing = planar_compose_one(standing.anchor, self.library.clips.facing[present.stop])
         reach = aim + 0.5 * s.window - (present.stop - present.phase) / self.graph.fps
         count, best, _, indexed = paths.find(
             state, facing, 0, aim, s.window, s.index and reach <= s.horizon, self._stamp(),
@@ -360,14 +361,6 @@ class AvoidanceSearch:
                 np.zeros(cells.ACROSS * cells.ACROSS * cells.HIGH, dtype=np.int64),
             )  # fmt: skip
         return self._local.room
-
-
-def _beyond(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """``planar_compose`` of two transforms only: a search has no time for arrays of them."""
-    ax, az, yaw, x, z, turn = *a.tolist(), *b.tolist()
-    c, s = cos(yaw), sin(yaw)
-    whole = remainder(yaw + turn, 2.0 * pi)
-    return np.array([c * x + s * z + ax, -s * x + c * z + az, whole])
 
 
 def _now(standing: Standing) -> kernels.Now:

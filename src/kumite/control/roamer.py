@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from math import cos, pi, sin
 
 import numpy as np
 
 from kumite.control.protocol import Plain, View
 from kumite.graph import Layer
-from kumite.graph.spans import nearest
-from kumite.rotation import planar_compose, wrap_angle
+from kumite.graph.spans import NO_STATE, nearest
+from kumite.rotation import planar_compose_one
 
 FEW = 3  # of the best ways to go on that are drawn from …
 AS_GOOD = 0.15  # … if they cost no more above the best
@@ -51,8 +52,10 @@ class Roamer(Plain):
         peaks = np.sort(strikes.frame)
         soon = np.maximum(table.first + round(SOON * layer.clips.fps), table.last)
         self._strikes = np.searchsorted(peaks, soon, "right") > np.searchsorted(peaks, table.first)
-        self._ways: list[np.ndarray | None] = [None] * table.states
         self._avoids = avoids
+        self._ways: list[tuple[np.ndarray, ...] | None] = [None] * table.states
+        self._states = np.full(len(layer.clips), NO_STATE)  # [F] at each frame
+        self._states[table.state_frame] = np.arange(table.states)
 
     def restful(self) -> np.ndarray:
         """Stretches to begin after: those that avoid nothing and end with many ways to go on."""
@@ -63,44 +66,43 @@ class Roamer(Plain):
 
     def choose(self, view: View) -> int:
         """A way to go on that avoids nothing, looks where it should and stays where it should."""
-        k, table, cast = view.me, self.library.table, view.cast
+        k, cast = view.me, view.cast
         stop = int(cast.stop[k])
-        ways = self._ways_from(self._state_at(stop))
-        facing = planar_compose(cast.anchor[k], self.library.clips.facing[stop])
-        ends = planar_compose(facing, table.displacement[ways])
-        home, watched = self.homes[k], self.watched(k)
-        if watched is None:
-            want = np.full(len(ends), home[2])
-        else:
-            want = np.arctan2(watched[0] - ends[:, 0], watched[1] - ends[:, 1])
-        off = np.abs(wrap_angle(want - ends[:, 2]))
-        away = np.linalg.norm(ends[:, :2] - home[:2], axis=1)
-        keeps = watched is not None and self.distance is not None
-        cost = off + HOME * np.maximum(away - (ROAMING if keeps else TOO_FAR), 0.0)
-        if keeps:
-            more = np.linalg.norm(ends[:, :2] - watched, axis=1) - self.distance
-            cost += np.where(more < 0.0, -TOO_NEAR, TOO_WIDE) * more + IN_VAIN * self._strikes[ways]
+        ways, dx, dz, turn, strikes = self._ways_from(self._state_at(stop))
+        x, z, yaw = planar_compose_one(cast.anchor[k], self.library.clips.facing[stop]).tolist()
+        c, s = cos(yaw), sin(yaw)
+        x, z = x + c * dx + s * dz, z - s * dx + c * dz  # [W] where each way ends …
+        home_x, home_z, home_yaw = self.homes[k].tolist()
+        watched = self.watched(k)
+        want = home_yaw if watched is None else np.arctan2(watched[0] - x, watched[1] - z)
+        cost = np.abs((want - yaw - turn + pi) % (2.0 * pi) - pi)  # … and looks
+        away = np.hypot(x - home_x, z - home_z)
+        keeps = None if watched is None else self.distance
+        cost += HOME * np.maximum(away - (TOO_FAR if keeps is None else ROAMING), 0.0)
+        if watched is not None and keeps is not None:
+            more = np.hypot(x - watched[0], z - watched[1]) - keeps
+            cost += np.where(more < 0.0, -TOO_NEAR, TOO_WIDE) * more + IN_VAIN * strikes
         few = np.argsort(cost, kind="stable")[:FEW]
         few = few[cost[few] <= cost[few[0]] + AS_GOOD]
-        return view.spans.span(self.layer, int(ways[view.rng.choice(few)]))
+        return view.spans.span(self.layer, int(ways[few[view.rng.integers(len(few))]]))
 
-    def _ways_from(self, state: int) -> np.ndarray:
-        """The stretches that avoid nothing from a state, or all if there are none."""
+    def _ways_from(self, state: int) -> tuple[np.ndarray, ...]:
+        """The stretches [W] that avoid nothing from a state, or all if there are none; where each
+        leads to (x, z and yaw), and whether it strikes."""
         found = self._ways[state]
         if found is None:
             table = self.library.table
             ways = table.stretch[table.actions_of(state)]
             calm = ways[~self._avoids[ways]]
-            found = self._ways[state] = calm if len(calm) else ways
+            ways = calm if len(calm) else ways
+            way = np.ascontiguousarray(table.displacement[ways].T)
+            found = self._ways[state] = (ways, *way, self._strikes[ways])
         return found
 
     def _state_at(self, frame: int) -> int:
         """The state at a library frame, or the one most like it."""
-        table = self.library.table
-        state = int(np.searchsorted(table.state_frame, frame))
-        if state < table.states and table.state_frame[state] == frame:
-            return state
-        return int(table.target[self._nearest[frame]])
+        state = int(self._states[frame])
+        return state if state != NO_STATE else int(self.library.table.target[self._nearest[frame]])
 
     @cached_property
     def _nearest(self) -> np.ndarray:

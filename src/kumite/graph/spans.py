@@ -7,8 +7,10 @@ like the end of the span that was played.
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -41,14 +43,18 @@ class Spans:
         first.flags.writeable = last.flags.writeable = False
         return cls(tuple(layers), begins, first, last)
 
+    @cached_property
+    def _begins(self) -> list[int]:
+        return self.begins.tolist()
+
     def span(self, layer: str, stretch: int) -> int:
         """The span that is a layer's stretch."""
-        return int(self.begins[self.layers.index(layer)]) + int(stretch)
+        return self._begins[self.layers.index(layer)] + int(stretch)
 
     def stretch(self, span: int) -> tuple[str, int]:
         """The layer and the stretch that a span is."""
-        n = int(np.searchsorted(self.begins, span, side="right")) - 1
-        return self.layers[n], int(span - self.begins[n])
+        n = bisect_right(self._begins, span) - 1
+        return self.layers[n], int(span) - self._begins[n]
 
 
 def entries(layer: Layer) -> np.ndarray:

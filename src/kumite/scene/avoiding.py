@@ -19,6 +19,7 @@ from kumite.graph.spans import Spans
 from kumite.kernels.blow import NOBODY
 from kumite.scene.events import Decision, Event, Searched
 from kumite.scene.settings_dodge import DodgerSettings, DodgeSettings
+from kumite.scene.starts import draw_starts, stream
 from kumite.synthesis import Cast
 
 
@@ -65,10 +66,11 @@ class Avoiders:
     def start(self, seed: int) -> None:
         """Begin, or begin again, with a seed."""
         self.cast = cast = Cast(self.library, len(self.names))
-        rng, restful = np.random.default_rng(seed), self.roamer.restful()
-        begun = rng.choice(restful, len(self.names)).tolist()
-        for k, stretch in enumerate(begun):
-            cast.place(k, int(self.library.table.target[stretch]), self.roamer.homes[k])
+        streams = [stream(seed, k) for k in range(len(self.names))]
+        begun, frame = draw_starts(self.library, self.roamer.restful(), streams)
+        states = self.library.table.target[begun].tolist()
+        for k, home in enumerate(self.roamer.homes):
+            cast.place(k, states[k], home, frame=int(frame[k]))
         cast.show(0.0)
         self.conductor = Conductor(
             cast,
@@ -79,7 +81,7 @@ class Avoiders:
             begin=self._begin,
             free=lambda k: True,
         )
-        self.conductor.start(seed, begun)
+        self.conductor.start(seed, begun.tolist())
 
     def tune(self, **rules: object) -> None:
         """Other rules for the next searches. Errors: values that are not allowed, or rules that
