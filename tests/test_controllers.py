@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 
 from kumite import caches
-from kumite.control.protocol import PASS, View
+from kumite.control.conductor import ControllerError
+from kumite.control.protocol import PASS, Plain, View
 from kumite.errors import KumiteError
 from kumite.graph import Layer, Library, builtin_library, pose_features
 from kumite.graph.distance import squared_distances
 from kumite.graph.spans import NO_STATE, Spans, entries, nearest
-from kumite.scene import World, load_scene
-from kumite.scene.events import Avoided, Decision, Hit, Reaction, Struck
+from kumite.scene import SceneSettings, World, load_scene, record
+from kumite.scene.events import Avoided, Decision, Done, Hit, Launch, Reaction, Struck
 
-LAYERS = ("actions", "avoidance")
+LAYERS = ("actions", "avoidance", "preparation")
 
 
 @pytest.fixture(scope="module")
@@ -154,3 +155,149 @@ def test_who_must_avoid_needs_both_layers(everything: Library, fighters: Layer):
         settings.fighter[0].__class__.model_validate(
             {**settings.fighter[0].model_dump(), "controllers": ("fight", "avoid")}
         )
+
+
+# Controllers of all papers together ---------------------------------------------------------------
+
+
+def test_one_prepares_avoids_and_fights(everything: Library):
+    """The gauntlet: the motion at the bar is done, balls are avoided and blows thrown by one
+    character, who never jumps from one place or pose to another."""
+    cache = caches.cache_folder(None)
+    world = World(load_scene("gauntlet"), everything, seed=1, cache=cache)
+    run = record(world, 30.0)
+    red = [e for e in run.events if e.character == "red"]
+    assert {e.by for e in red if isinstance(e, Decision)} == {"prepare", "avoid", "tree"}
+    assert any(isinstance(e, Launch) for e in red) and any(isinstance(e, Done) for e in red)
+    assert any(isinstance(e, Avoided) for e in red)
+    assert any(isinstance(e, Hit) for e in run.events)
+    goes = np.linalg.norm(np.diff(run.root_position[:, 0], axis=0), axis=1) * run.fps
+    assert goes.max() < 6.0
+    turns = 2.0 * np.arccos(np.clip(np.abs(np.sum(run.wxyz[1:] * run.wxyz[:-1], -1)), 0, 1))
+    assert turns[:, 0].max() * run.fps < 60.0  # rad/s: in captured punches up to 48
+
+
+def test_two_teams_of_mixed_controllers_strike_only_each_other(everything: Library):
+    world = ran(World(load_scene("melee"), everything, seed=4, cache=caches.cache_folder(None)), 20)
+    team = {p.name: p.team for p in world.settings.people}
+    hits = [e for e in world.events if isinstance(e, Hit)]
+    assert len(hits) >= 5 and all(team[e.character] != team[e.victim] for e in hits)
+    decided = {(e.character, e.by) for e in world.events if isinstance(e, Decision)}
+    assert {("red 3", "policy"), ("blue 1", "tree"), ("blue 2", "policy")} <= decided
+
+
+# From without ------------------------------------------------------------------------------------
+
+
+def _led(library: Layer, *controllers: str) -> World:
+    """Red is led from without; blue fights it."""
+    red = {"name": "red", "position": (0, -0.7), "controllers": controllers}
+    blue = {"name": "blue", "position": (0, 0.7), "yaw_deg": 180, "against": "red"}
+    blue["fight"] = {"by": "tree"}
+    settings = {"title": "led", "character": [red, blue]}
+    return World(SceneSettings.model_validate(settings), library, seed=3)
+
+
+def test_a_character_is_led_a_step_at_a_time(fighters: Layer):
+    world = _led(fighters, "external")
+    draw, chosen = np.random.default_rng(0), []
+    for _ in range(600):
+        choices = {}
+        if "red" in world.waiting:
+            options = world.options("red")
+            assert len(options) and np.all(options < len(world.spans.first))
+            choices["red"] = int(draw.choice(options))
+            chosen.append(choices["red"])
+        world.step(choices)
+    told = [e for e in world.events if isinstance(e, Decision) and e.character == "red"]
+    assert len(chosen) > 5 and all(e.by == "external" for e in told)
+    assert [world.spans.span("actions", e.stretch) for e in told] == chosen
+
+
+def test_without_a_choice_it_stands(fighters: Layer):
+    world = _led(fighters, "external")
+    while "red" not in world.waiting:
+        world.step()
+    for _ in range(5):
+        world.step()
+    frame = int(world.cast.frame[0])
+    for _ in range(20):
+        if not any(isinstance(e, Reaction) for e in world.events):
+            world.step()
+            assert int(world.cast.frame[0]) == frame and "red" in world.waiting
+
+
+def test_choices_for_who_does_not_wait_are_refused(fighters: Layer):
+    world = _led(fighters, "external")
+    with pytest.raises(KumiteError, match=r"unknown character 'rde'.*red"):
+        world.step({"rde": 0})
+    while "red" not in world.waiting:
+        world.step()
+    with pytest.raises(KumiteError, match="chose span -3; expected PASS or a number from 0"):
+        world.step({"red": -3})
+    world.step({"red": int(world.options("red")[0])})
+    with pytest.raises(KumiteError, match="a choice for red, who is in an action"):
+        world.step({"red": 0})
+    with pytest.raises(KumiteError, match="red is in an action"):
+        world.options("red")
+
+
+def test_a_function_is_a_controller(fighters: Layer):
+    world = World(load_scene("boxing"), fighters, seed=2)
+    idle = world.spans.span("actions", world.tree.kinds.index("idle"))
+
+    def rest(view: View) -> int:
+        return idle if view.seconds < 2.0 else PASS
+
+    world.character("red").controllers.insert(0, rest)  # type: ignore[arg-type]
+    ran(world, 8.0)
+    red = [e for e in world.events if isinstance(e, Decision) and e.character == "red"]
+    assert {e.by for e in red if e.frame < 2.0 * world.fps} == {"rest"}
+    assert {e.by for e in red if e.frame >= 2.0 * world.fps} == {"tree"}
+
+
+class Wrong(Plain):
+    """Chooses what there is not, or fails, from its second choice on."""
+
+    name = "wrong"
+
+    def __init__(self, what: object, layer: str | None = None) -> None:
+        self.what, self.layer, self.times = what, layer, 0
+
+    def start(self) -> None:
+        self.times = 0
+
+    def choose(self, view: View) -> int:
+        self.times += 1
+        if self.times < 2:
+            return PASS
+        if isinstance(self.what, Exception):
+            raise self.what
+        return self.what  # type: ignore[return-value]
+
+
+@pytest.mark.parametrize(
+    ("what", "layer", "said"),
+    [
+        (ZeroDivisionError("by nothing"), None, "'wrong' of red failed in choose: by nothing"),
+        (10**9, None, "'wrong' of red chose span 1000000000; expected PASS or a number from 0"),
+        ("jab", None, "'wrong' of red chose span 'jab'"),
+        (None, None, "'wrong' of red chose span None"),
+        (0, "avoidance", "chose span 0 of layer 'actions'; expected one of its own, 'avoidance'"),
+    ],
+)
+def test_a_controller_that_fails_stops_the_world_and_loses_nothing(
+    everything: Library, what: object, layer: str | None, said: str
+):
+    world = World(load_scene("under-fire"), everything, seed=1)
+    world.character("red").controllers.insert(0, Wrong(what, layer))
+    with pytest.raises(ControllerError, match=said) as failed:
+        record(world, 20.0)
+    kept = failed.value.recording
+    assert f"frame {world.frame}:" in str(failed.value)
+    assert len(kept) == world.frame + 1 and len(kept.events) == len(world.events)
+    with pytest.raises(ControllerError, match=said):  # it goes no further …
+        world.step()
+    world.character("red").controllers.pop(0)
+    world.reset(1)  # … until it begins again
+    assert world.step()

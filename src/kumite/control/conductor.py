@@ -182,7 +182,10 @@ class Conductor:
                     f"a choice for {name}, who is in an action; expected one of those who wait: "
                     f"{', '.join(waiting) or 'nobody'}"
                 )
-            out[k] = self._checked(k, span, _GIVEN)
+            try:
+                out[k] = self._checked(k, span, _GIVEN)
+            except ControllerError as error:  # whoever chose it may choose again
+                raise KumiteError(str(error)) from None
         return out
 
     def _number(self, name: str) -> int:
