@@ -18,6 +18,7 @@ from kumite.control.volumes import hung
 from kumite.errors import KumiteError
 from kumite.kernels import avoid as kernels
 from kumite.kernels.joins import ANKLE
+from kumite.kernels.weighing import weigh
 from kumite.rotation import planar_apply
 from kumite.synthesis import Cast
 from tests.avoid_twin import Twin
@@ -266,7 +267,7 @@ def judged(attack: Attack, clearance: float = 0.0) -> tuple[str, float]:
     given_, which = packed([attack], 0.0, facing[begins, :2])
     assert which == [0]
     room, out = search._room(), np.zeros(8)
-    became = kernels.weigh(
+    became = weigh(
         np.zeros(1, dtype=np.int32), 0, part, 0, aim, now, graph, volumes, given_,
         search.weighing, searching(culling=False).masks, room.scratch, out,
     )  # fmt: skip

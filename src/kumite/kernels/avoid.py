@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kumite.kernels.jit import lean_kernel
-from kumite.kernels.joins import Joins, displace, follow, shift_body, shift_bounds
+from kumite.kernels.joins import Joins
 from kumite.kernels.warp import carried, fill, phase_times, solve
 
 DEPTH = 32  # edges of a path at most
@@ -316,260 +316,35 @@ def time_path(path, count, part, aim, scale, now, graph, weighing, scratch):
 
 
 @lean_kernel
-def far_off(qx, qy, qz, before, px, py, pz, bound, g, seen, r):
-    """How near a sphere that goes from q to p can at least come to a group."""
-    ux, uy, uz = px - bound[0, g], py - bound[1, g], pz - bound[2, g]
-    size = bound[3, g]
-    if seen:
-        sx, sy, sz = qx - before[0, g], qy - before[1, g], qz - before[2, g]
-        ux, uy, uz = ux - sx, uy - sy, uz - sz
-        along = -(sx * ux + sy * uy + sz * uz) / (ux * ux + uy * uy + uz * uz + 1e-18)
-        along = min(max(along, 0.0), 1.0)
-        ux, uy, uz = sx + along * ux, sy + along * uy, sz + along * uz
-        size = max(size, before[3, g])
-    return np.sqrt(ux * ux + uy * uy + uz * uz) - size - r
-
-
-@lean_kernel
-def certainly_hit(part, frame, px, py, pz, masks):
-    """Whether a point is where the body is throughout a part: one bit of its masks."""
-    bits, origin, pixel, height = masks.bits, masks.origin, masks.pixel, masks.height
-    a, b = px - frame[0], pz - frame[1]
-    x = frame[2] * a - frame[3] * b - origin[part, 0]
-    z = frame[3] * a + frame[2] * b - origin[part, 2]
-    i, k = int(np.floor(x / pixel)), int(np.floor(z / pixel))
-    level = int(np.floor((py - origin[part, 1]) / height))
-    if i < 0 or i >= 64 or k < 0 or k >= bits.shape[2] or level < 0 or level >= bits.shape[1]:
-        return False
-    return (bits[part, level, k] >> np.uint64(i)) & np.uint64(1) != np.uint64(0)
-
-
-@lean_kernel
-def glance(path, count, main, aim, frames, now, graph, volumes, attacks, weighing, scratch):
-    """Distances of an attack to the body as shown, and to the body as the part begins, at its last
-    sample up to ``aim``: the smallest are no larger. (inf, inf) where the path is
-    over by then, or the attack does not begin before.
-    """
-    n = attacks.sample[main]
-    while n + 1 < attacks.sample[main + 1] and attacks.when[n + 1] <= aim:
-        n += 1
-    at, when, t, step = scratch.at, scratch.when, attacks.when[n], 1
+def moment(t, step, frames, when):
+    """The first frame of a path, from ``step`` on, shown at or after a time t; or the last."""
     while step < frames - 1 and when[step] < t:
         step += 1
-    if t < 0.0 or when[step] < t:
-        return np.inf, np.inf
-    part_way = (t - when[step - 1]) / (when[step] - when[step - 1])
-    x, k = at[step - 1] + part_way * (at[step] - at[step - 1]), 0
-    while k < count and x > scratch.upto[k]:
-        k += 1
-    phase, last = phase_at(x, k, path, now, graph, scratch)
-    row = min(max(int(phase), 0), last)
-    share, after, everyone = phase - row, min(row + 1, last), volumes.radius.shape[0]
-    moved, body = scratch.moved[0], scratch.body
-    displace(row, share, after, scratch.anchor[k], step, part_way, graph.joins, scratch, moved)
-    put_body(volumes, 0, everyone, row, share, after, scratch.anchor[k], body)
-    shift_body(volumes, 0, everyone, moved, body)
-    shown, still = np.inf, np.inf
-    for i in range(attacks.count[main]):
-        x, y, z = attacks.centre[n, i, 0], attacks.centre[n, i, 1], attacks.centre[n, i, 2]
-        r = attacks.radius[main, i]
-        shown = min(shown, gap(x, y, z, r, body, volumes.radius, 0, everyone))
-        still = min(still, gap(x, y, z, r, scratch.still, volumes.radius, 0, everyone))
-    return shown, still
+    return step
 
 
 @lean_kernel
-def weigh(
-    path, count, part, main, aim, now, graph, volumes, attacks, weighing, masks, scratch, out
-):
-    """Evaluate a candidate: Eqs. 2 to 10. Returns what became of it; out [8] is then
+def between(t, step, when):
+    """How far on the way from the frame before to this one a path is at a time t, 0 to 1."""
+    return (t - when[step - 1]) / (when[step] - when[step - 1])
 
-    (e, e_avoidance, e_body, e_timescale, e', d, d0, s). main: the attack to be avoided, whose time
-    is ``aim`` [s]; of the others it is enough not to be hit. masks: see :func:`certainly_hit`.
 
-    Hit or not and d are of the body as it will be shown, with what joins leave; e' and d0 of the
-    capture: what place a part leaves is its own, whichever way it is come to.
+@lean_kernel
+def timed(path, count, part, aim, now, graph, weighing, scratch):
+    """Lay a path out, and time it so that its part falls on ``aim`` [s] (Eqs. 2 and 3).
+
+    Returns (outcome, frames, s of Eq. 3, s with ramps): VALID, or why it cannot be timed.
     """
     scale, outcome = time_scale(path, count, part, aim, now, graph, weighing, scratch)
-    if outcome != VALID:
-        return outcome
     most = weighing.most
+    if outcome != VALID:
+        return outcome, 0, scale, scale
     if not (1.0 / most <= scale <= most):
-        return TOO_FAST
+        return TOO_FAST, 0, scale, scale
     lay(path, count, now, graph, scratch)
     frames, smooth = time_path(path, count, part, aim, scale, now, graph, weighing, scratch)
     if frames == 0:
-        return TOO_LONG
+        return TOO_LONG, 0, scale, smooth
     if not (1.0 / most <= smooth <= most):
-        return TOO_FAST
-    begins, ends = float(graph.begins[part]), float(graph.ends[part])
-    frame, at, when = scratch.anchor[count], scratch.at, scratch.when
-    until = 0.0
-    for m in range(attacks.sample.shape[0] - 1):
-        until = max(until, attacks.when[attacks.sample[m + 1] - 1])
-    follow(path, count, frames, until, now, graph, scratch)
-    # Where the attack passes while the body is away, a look at its masks is enough for many.
-    own = now.phase if count == 0 else graph.first[path[count - 1]] - 1 - scratch.upto[count - 1]
-    step, reckoned = 1, graph.joins.reckoned
-    for n in range(attacks.sample[main], attacks.sample[main + 1]):
-        t = attacks.when[n]
-        if t < 0.0 or masks.bits.shape[0] == 0:
-            continue
-        while step < frames - 1 and when[step] < t:
-            step += 1
-        if when[step] < t:
-            break
-        share = (t - when[step - 1]) / (when[step] - when[step - 1])
-        phase = own + at[step - 1] + share * (at[step] - at[step - 1])
-        if phase < begins or phase > ends:
-            continue
-        x, y, z = 0.0, 0.0, 0.0  # by how much the root will be shown elsewhere
-        if reckoned:
-            root, then = scratch.offset[step - 1, 1, 0], scratch.offset[step, 0, 0]
-            x = root[0] + share * (then[0] - root[0])
-            y = root[1] + share * (then[1] - root[1])
-            z = root[2] + share * (then[2] - root[2])
-        for i in range(attacks.count[main]):
-            if attacks.radius[main, i] >= masks.least and certainly_hit(
-                part, frame, attacks.centre[n, i, 0] - x, attacks.centre[n, i, 1] - y,
-                attacks.centre[n, i, 2] - z, masks,
-            ):  # fmt: skip
-                return CULLED
-    first = graph.begins[part]
-    group, radius = volumes.group, volumes.radius
-    put_body(volumes, 0, radius.shape[0], first, 0.0, first, frame, scratch.still)
-    put_bounds(volumes, first, 0.0, first, frame, scratch.still_bound)
-    body, bound, before, before_bound = (
-        scratch.body,
-        scratch.bound,
-        scratch.before,
-        scratch.before_bound,
-    )
-    moved, moved_before = scratch.moved[0], scratch.moved[1]
-    depth, nearest = 0.0, np.inf
-    # How near it comes at the time that counts: what cannot come nearer is not looked into.
-    near_by, was = glance(
-        path, count, main, aim, frames, now, graph, volumes, attacks, weighing, scratch
-    )
-    if near_by < weighing.clearance:
-        return HIT
-    near_by, was = near_by + EPSILON, was + EPSILON
-    for turn in range(attacks.sample.shape[0] - 1):
-        m = main if turn == 0 else (turn - 1 if turn <= main else turn)
-        least = near_by if m == main else weighing.clearance
-        step, k, seen = 1, 0, False
-        row, share, after, edge = 0, 0.0, 0, 0
-        for n in range(attacks.sample[m], attacks.sample[m + 1]):
-            t = attacks.when[n]
-            if t < 0.0:
-                continue
-            while step < frames - 1 and when[step] < t:
-                step += 1
-            if when[step] < t:
-                break  # what comes later is another path's
-            part_way = (t - when[step - 1]) / (when[step] - when[step - 1])
-            x = at[step - 1] + part_way * (at[step] - at[step - 1])
-            while k < count and x > scratch.upto[k]:
-                k += 1
-            phase, last = phase_at(x, k, path, now, graph, scratch)
-            old_row, old_share, old_after, old_edge = row, share, after, edge
-            row, edge = min(max(int(phase), 0), last), k
-            share, after = phase - row, min(row + 1, last)
-            put_bounds(volumes, row, share, after, scratch.anchor[k], bound)
-            displace(
-                row, share, after, scratch.anchor[k], step, part_way, graph.joins, scratch, moved
-            )
-            shift_bounds(volumes, moved, bound)
-            away = m == main and k == count and begins <= phase <= ends
-            for i in range(attacks.count[m]):
-                r = attacks.radius[m, i]
-                px, py, pz = (
-                    attacks.centre[n, i, 0],
-                    attacks.centre[n, i, 1],
-                    attacks.centre[n, i, 2],
-                )
-                qx, qy, qz = px, py, pz
-                if seen:
-                    qx = attacks.centre[n - 1, i, 0]
-                    qy = attacks.centre[n - 1, i, 1]
-                    qz = attacks.centre[n - 1, i, 2]
-                for g in range(bound.shape[1]):
-                    low, high = group[g], group[g + 1]
-                    # Only a group that can be nearer than what is nearest so far is looked into.
-                    if far_off(qx, qy, qz, before_bound, px, py, pz, bound, g, seen, r) < least:
-                        put_body(volumes, low, high, row, share, after, scratch.anchor[k], body)
-                        shift_body(volumes, low, high, moved, body)
-                        if seen:
-                            put_body(
-                                volumes, low, high, old_row, old_share, old_after,
-                                scratch.anchor[old_edge], before,
-                            )  # fmt: skip
-                            shift_body(volumes, low, high, moved_before, before)
-                            d = swept_gap(
-                                qx, qy, qz, before, px, py, pz, body, r, radius, low, high
-                            )
-                        else:
-                            d = gap(px, py, pz, r, body, radius, low, high)
-                        if d < weighing.clearance:
-                            return HIT
-                        least = min(least, d)
-                    if m != main:
-                        continue
-                    still = scratch.still_bound
-                    dx, dy, dz = px - still[0, g], py - still[1, g], pz - still[2, g]
-                    lower = np.sqrt(dx * dx + dy * dy + dz * dz) - still[3, g] - r
-                    if lower < was:
-                        was = min(was, gap(px, py, pz, r, scratch.still, radius, low, high))
-                    if away and lower < 0.0:
-                        put_body(volumes, low, high, row, share, after, scratch.anchor[k], body)
-                        more = overlap(
-                            px, py, pz, r, scratch.still, body, radius, weighing.left, low, high
-                        )
-                        depth += more * attacks.lasts[n]
-            for g in range(bound.shape[1]):
-                for c in range(4):
-                    before_bound[c, g] = bound[c, g]
-            for p in range(moved.shape[0]):
-                for c in range(3):
-                    moved_before[p, c] = moved[p, c]
-            seen = True
-        if m == main:
-            nearest = least
-    if nearest == np.inf:
-        return TOO_LONG
-    avoidance = max(0.0, 1.0 - depth / weighing.enough)
-    if nearest <= was:
-        near = 1.0
-    else:
-        near = min(1.0, (nearest - was) / weighing.far)
-    slow = max(scale, 1.0 / scale) / most
-    weight = weighing.weight
-    out[0] = weight[0] * avoidance + weight[1] * near + weight[2] * slow
-    out[1], out[2], out[3] = avoidance, near, slow
-    out[4], out[5], out[6], out[7] = depth, nearest, was, smooth
-    return VALID
-
-
-@lean_kernel
-def weigh_all(
-    count, path, length, part, main, aim, now, graph, volumes, attacks, weighing, masks, scratch,
-    outcome, scores,
-):  # fmt: skip
-    """Evaluate candidates [C, D]; what became of them [C] and their scores [C, 8]. Returns the best
-    (the first of equals, -1 for none) and whether it avoids what would have hit the body.
-
-    Who is where the attack comes by and leaves in time goes before who never was there.
-    """
-    best, least, avoids = -1, np.inf, False
-    for c in range(count):
-        out = scores[c]
-        outcome[c] = weigh(
-            path[c], length[c], part[c], main, aim, now, graph, volumes, attacks, weighing, masks,
-            scratch, out,
-        )  # fmt: skip
-        if outcome[c] != VALID:
-            continue
-        leaves = out[4] > 0.0
-        if best < 0 or (leaves and not avoids) or (leaves == avoids and out[0] < least):
-            best, least, avoids = c, out[0], leaves
-    return best, avoids
+        return TOO_FAST, 0, scale, smooth
+    return VALID, frames, scale, smooth

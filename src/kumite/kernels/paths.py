@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from kumite.kernels.avoid import DEPTH, gap, lay, middle, put_body, time_path, time_scale, weigh_all
+from kumite.kernels.avoid import DEPTH, gap, lay, middle, put_body, time_path, time_scale
 from kumite.kernels.cells import look_up
 from kumite.kernels.jit import kernel, lean_kernel
+from kumite.kernels.weighing import weigh_all
 
 
 @kernel
