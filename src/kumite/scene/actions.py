@@ -13,7 +13,7 @@ from kumite.graph import Layer
 from kumite.rotation import from_yaw, multiply, planar_apply, planar_inverse
 from kumite.scene.events import strike
 from kumite.scene.recording import Recording
-from kumite.scene.stage import Playback
+from kumite.scene.stage import Offers, Playback
 
 WHO = "actor"
 
@@ -71,6 +71,11 @@ class ActionPlayback(Playback):
         self.actions = _actions(library)
         super().__init__(action_recording(library, action))
         self.action = action
+
+    @property
+    def offers(self) -> Offers:
+        """It can be wound, and another action chosen."""
+        return Offers(played=self, listed=self)
 
     def choose(self, action: int) -> None:
         """Play another action, from its first frame. Errors: no such action."""

@@ -1,79 +1,276 @@
-"""What may be told to a fighter of a game tree while it fights; its next decision uses it (B12).
-And to those who avoid: their next search does.
+"""What may be told while a scene runs: numbers to go by, and actions that are wanted or not.
+
+Whatever is told counts from the next decision on (B12).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from kumite.control import Route
 from kumite.control.avoidance import AvoidanceSearch
+from kumite.control.avoider import Avoider
 from kumite.control.game_tree import GameTree, Player
-from kumite.control.styles import ANGLES
+from kumite.control.rules import DEEPEST, Temper
+from kumite.control.styles import ANGLES, ORDER, PATH
+from kumite.control.tuning import Scale, Tunable
 from kumite.errors import KumiteError
+from kumite.synthesis.rates import FASTEST
 
-SPANS = {  # least, most, step of what may be tuned; angles in degrees
-    "depth": (1, 5, 1),
-    "preferred_distance": (0, 4, 0.1),
-    "distance": (0, 1e3, 1),
-    "preferred_facing": (-180, 180, 5),
-    "facing": (0, 1e3, 1),
-    "given_short": (0, 1e5, 1e3),
-    "given_long": (0, 1e5, 1e3),
-    "taken": (0, 1e5, 1e3),
-    "suitability": (0, 1e3, 1),
-    "preferred_heading": (-180, 180, 5),
-    "heading": (0, 1e3, 1),
-    "place": (0, 1e5, 10),
-    "requirement": (0, 1e7, 1e5),
-    "boredom": (0, 2e5, 1e3),
-    "restlessness": (0, 1e3, 10),
-}
-OF_PLAYER = ("depth", "boredom", "restlessness")  # the others are of its style
 ORDERS = ("wanted", "unwanted", "only")
 HEADING = 10.0  # w_γ of who is given a heading and minded none: as the other movement terms
+FEW_TO_TUNE = 4  # characters that each have their own; of more, all have one together
 
 
-class StyleControl:
-    """A number that a fighter goes by. Angles are in degrees, as sliders show them."""
+class Spec(NamedTuple):
+    """A number that may be tuned, whoever's it is."""
 
-    def __init__(self, who: str, field: str, player: Player) -> None:
-        self.name = f"{who}: {field}"
-        self.field = field
-        self.player = player
-        least, most, self.step = SPANS[field]
-        self.minimum, self.maximum = min(least, self.value), max(most, self.value)
+    field: str
+    unit: str
+    minimum: float
+    maximum: float
+    scale: Scale
+    help: str
 
-    @property
-    def value(self) -> float:
-        holder = self.player if self.field in OF_PLAYER else self.player.style
-        value = float(getattr(holder, self.field) or 0.0)
-        return round(float(np.degrees(value)), 6) if self.field in ANGLES else value
 
-    def set(self, value: float) -> None:
-        """A heading brings its weight, and the weight a heading, if there is none. Errors: values
-        that are not allowed.
-        """
-        player, field = self.player, self.field
-        if field in OF_PLAYER:
-            value = round(value) if field == "depth" else value
-            setattr(player, field, getattr(replace(player, **{field: value}), field))
-            return
-        weights = {field: float(np.radians(value)) if field in ANGLES else float(value)}
+STYLE = (
+    Spec("preferred_distance", "m", 0, 5, "linear", "how far from the opponent it wants to be"),
+    Spec("distance", "points/m²", 0, 1e4, "log", "what it costs to be nearer or farther"),
+    Spec("preferred_facing", "°", -180, 180, "linear", "how far beside the opponent it looks"),
+    Spec("facing", "points/rad²", 0, 1e4, "log", "what it costs to look elsewhere"),
+    Spec("given_short", "points/(m/s)", 0, 1e6, "log", "worth of its hooks and uppercuts"),
+    Spec("given_long", "points/(m/s)", 0, 1e6, "log", "worth of its straights, kicks and cuts"),
+    Spec("taken", "points/(m/s)", 0, 1e6, "log", "what it costs to be hit"),
+    Spec("suitability", "points", 0, 1e4, "log", "worth of a defence that suits the attack"),
+    Spec("preferred_heading", "°", -180, 180, "linear", "which way it looks, in the world"),
+    Spec("heading", "points/rad²", 0, 1e4, "log", "what it costs to look another way"),
+    Spec("place", "", 0, 1e3, "log", "of its path; 10: a metre² off costs a solid blow"),
+    Spec("requirement", "", 0, 1e8, "log", "of wanted actions; 10⁶: a hundred solid blows"),
+)
+PLAYER = (
+    Spec("depth", "levels", 1, DEEPEST - 1, "linear", "choices that it looks ahead"),
+    Spec("boredom", "points", 0, 1e6, "log", "what an action loses that was used lately"),
+    Spec("restlessness", "points", 0, 1e4, "log", "what it loses for each recent one of its kind"),
+    Spec("facing_deg", "°", 5, 180, "linear", "how far off the opponent actions may end"),
+)
+RULES = (
+    Spec("attack_range", "m", 0.2, 4, "linear", "from farther away nobody attacks"),
+    Spec("defence_range", "m", 0.2, 8, "linear", "from farther away nobody defends"),
+    Spec("catch", "m", 0, 3, "linear", "who comes so near has caught the other; 0: nobody"),
+    Spec("stagger_from", "m/s", 0.5, 20, "linear", "blows that make stagger"),
+    Spec("fall_from", "m/s", 0.5, 100, "log", "blows that fell"),
+)
+OF_WORLD = ("catch", "stagger_from", "fall_from")  # of the rules; the others are the tree's
+TEMPER = (
+    Spec("facing", "", 0, 20, "linear", "how much turning away cuts an action's worth"),
+    Spec("few", "actions", 1, 50, "linear", "how many of the best are drawn from"),
+    Spec("again", "actions", 1, 50, "linear", "how many are weighed a step further ahead"),
+    Spec("personal_space", "m", 0, 3, "linear", "kept to the other's body"),
+)
+SEARCH = (
+    Spec("avoidance", "", 0, 10, "linear", "weight of moving no more than need be"),
+    Spec("body", "", 0, 10, "linear", "weight of staying where it is"),
+    Spec("timescale", "", 0, 10, "linear", "weight of the captured speed"),
+    Spec("window", "s", 0.1, 4, "linear", "how far from the attack as captured"),
+    Spec("clearance", "m", 0, 0.3, "linear", "kept between body and attack"),
+    Spec("most", "", 1, FASTEST, "linear", "times the captured speed, at most"),
+)
+REACTION = Spec("reaction", "s", 0, 1, "linear", "until it knows of an attack that can be seen")
+KEPT = Spec("distance", "m", 0.5, 10, "linear", "kept to whoever attacks")
+CURVE = (
+    Spec("legs", "", 0.05, 10, "log", "C: below 1 the legs prepare later, above 1 sooner"),
+    Spec("upper", "", 0.05, 10, "log", "C of the upper body"),
+)
+REST = Spec("rest", "s", 0, 60, "linear", "that an opponent who was struck keeps away")
+WHOLE = ("depth", "few", "again")
+WEIGHTS = ("avoidance", "body", "timescale")  # in the order of the search's
+
+
+def tunable(
+    spec: Spec,
+    who: str,
+    controller: str,
+    key: str,
+    get: Callable[[], float],
+    put: Callable[[float], None],
+) -> Tunable:
+    """One of a spec; its range holds what it is now."""
+    low, high = min(spec.minimum, now := get()), max(spec.maximum, now)
+    whole = spec.field in WHOLE
+    return Tunable(
+        who,
+        controller,
+        spec.field,
+        spec.unit,
+        low,
+        high,
+        spec.scale,
+        spec.help,
+        key,
+        get,
+        put,
+        whole,
+    )
+
+
+# By game tree ------------------------------------------------------------------------------------
+
+
+def tree_tunables(who: str, player: Player, tree: GameTree) -> list[Tunable]:
+    """All numbers that a fighter by game tree goes by. Angles are in degrees."""
+    of_style = [
+        tunable(s, who, "tree", f"style.{s.field}", *_of_style(player, s.field)) for s in STYLE
+    ]
+    of_player = [
+        tunable(s, who, "tree", s.field, *_of_player(player, tree, s.field)) for s in PLAYER
+    ]
+    return of_player + of_style
+
+
+def _of_style(player: Player, field: str) -> tuple[Callable[[], float], Callable[[float], None]]:
+    standard = {"place": PATH, "requirement": ORDER}.get(field, 0.0)
+
+    def get() -> float:
+        value = float(getattr(player.style, field) or standard)
+        return round(float(np.degrees(value)), 6) if field in ANGLES else value
+
+    def put(value: float) -> None:
+        weights = {field: float(np.radians(value)) if field in ANGLES else value}
+        # A heading brings its weight, and the weight a heading.
         if field == "heading" and player.style.preferred_heading is None:
             weights["preferred_heading"] = 0.0
         if field == "preferred_heading" and player.style.heading == 0.0:
             weights["heading"] = HEADING
         player.style = player.style.changed(**weights)
 
+    return get, put
 
-def style_controls(who: str, player: Player) -> list[StyleControl]:
-    """All numbers that a fighter goes by."""
-    return [StyleControl(who, field, player) for field in SPANS]
+
+def _of_player(
+    player: Player, tree: GameTree, field: str
+) -> tuple[Callable[[], float], Callable[[float], None]]:
+    if field == "facing_deg":
+
+        def facing() -> float:
+            own = tree.rules.facing if player.facing is None else player.facing
+            return round(float(np.degrees(own)), 6)
+
+        def face(value: float) -> None:
+            player.facing = float(np.radians(value))
+
+        return facing, face
+    return (
+        lambda: float(getattr(player, field)),
+        lambda value: setattr(player, field, getattr(replace(player, **{field: value}), field)),
+    )
+
+
+def rule_tunables(tree: GameTree) -> list[Tunable]:
+    """Of the rules by which actions are pruned, and of what blows and catches are."""
+
+    def of(field: str) -> tuple[Callable[[], float], Callable[[float], None]]:
+        def put(value: float) -> None:
+            tree.rules = replace(tree.rules, **{field: value})
+
+        return lambda: float(getattr(tree.rules, field)), put
+
+    return [
+        tunable(s, "", "world" if s.field in OF_WORLD else "tree", f"bout.{s.field}", *of(s.field))
+        for s in RULES
+    ]
+
+
+# By policies -------------------------------------------------------------------------------------
+
+
+def policy_tunables(
+    names: Sequence[str], tempers: Sequence[Temper], behaviours: Sequence[str] = ()
+) -> list[Tunable]:
+    """Of fighters by policies: of each, or of all together where there are many. behaviours: names
+    of those besides approach and strike. Errors of setting one: all weights would be 0.
+    """
+    if len(tempers) > FEW_TO_TUNE:
+        return _policy_tunables("", tempers, behaviours)
+    return [
+        t for name, one in zip(names, tempers) for t in _policy_tunables(name, [one], behaviours)
+    ]
+
+
+def _policy_tunables(
+    who: str, tempers: Sequence[Temper], behaviours: Sequence[str]
+) -> list[Tunable]:
+    def weight(field: str) -> Tunable:
+        spec = Spec(field, "", 0, 12, "linear", f"weight of the behaviour {field}")
+        key = field if field in ("approach", "strike") else f"behaviours.{field}"
+
+        def put(value: float) -> None:
+            for temper in tempers:
+                temper.set_weight(field, value)
+
+        return tunable(spec, who, "policy", key, lambda: tempers[0].weight(field), put)
+
+    def other(spec: Spec) -> Tunable:
+        def put(value: float) -> None:
+            for temper in tempers:
+                setattr(temper, spec.field, value)
+
+        get = lambda: float(getattr(tempers[0], spec.field))  # noqa: E731  # with its put
+        return tunable(spec, who, "policy", spec.field, get, put)
+
+    return [
+        *(weight(field) for field in ("approach", "strike", *behaviours)),
+        *(other(spec) for spec in TEMPER),
+    ]
+
+
+# Who avoids, who prepares ------------------------------------------------------------------------
+
+
+def search_tunables(
+    search: Callable[[], AvoidanceSearch], tune: Callable[..., None]
+) -> list[Tunable]:
+    """Rules of the search for avoidances: searches that are under way keep theirs. tune: goes by
+    other rules from now on."""
+
+    def of(field: str) -> tuple[Callable[[], float], Callable[[float], None]]:
+        if field not in WEIGHTS:
+            return (
+                lambda: float(getattr(search().settings, field)),
+                lambda value: tune(**{field: value}),
+            )
+        n = WEIGHTS.index(field)
+
+        def weigh(value: float) -> None:
+            weights = list(search().settings.weights)
+            weights[n] = value
+            tune(weights=tuple(weights))
+
+        return lambda: float(search().settings.weights[n]), weigh
+
+    return [tunable(s, "", "avoid", f"dodge.{s.field}", *of(s.field)) for s in SEARCH]
+
+
+def reaction_tunables(names: Sequence[str], avoiders: Sequence[Avoider]) -> list[Tunable]:
+    """How soon those who avoid know of what comes: of each, or of all together where there are
+    many."""
+
+    def of(who: str, some: Sequence[Avoider]) -> Tunable:
+        def put(seconds: float) -> None:
+            for avoider in some:
+                avoider.reaction = seconds
+
+        return tunable(REACTION, who, "avoid", "reaction", lambda: some[0].reaction, put)
+
+    if len(avoiders) > FEW_TO_TUNE:
+        return [of("", avoiders)]
+    return [of(name, [one]) for name, one in zip(names, avoiders)]
+
+
+# Actions that are wanted, or not -----------------------------------------------------------------
 
 
 class OrderControl:
@@ -123,55 +320,3 @@ def check_orders(who: str, tree: GameTree, player: Player, route: Route | None) 
             )
         except KumiteError as error:
             raise KumiteError(f"{who}{where}: {error}") from None
-
-
-SEARCH_SPANS = {  # least, most, step, and what it is called
-    "window": (0.1, 4.0, 0.05, "T_window [s]"),
-    "clearance": (0.0, 0.3, 0.005, "clearance [m]"),
-}
-WEIGHTS = ("avoidance", "body", "timescale")  # in the order of the search's
-HEAVIEST = 10.0
-
-
-class Searching(Protocol):
-    """A scene in which somebody avoids."""
-
-    @property
-    def search(self) -> AvoidanceSearch:
-        """What they search with now."""
-        ...
-
-    def tune(self, **rules: object) -> None:
-        """Other rules for the next searches."""
-        ...
-
-
-class SearchControl:
-    """A number that searches go by."""
-
-    def __init__(self, scene: Searching, field: str) -> None:
-        self.scene, self.field = scene, field
-        spans = SEARCH_SPANS.get(field, (0.0, HEAVIEST, 0.1, f"weight of {field}"))
-        self.minimum, self.maximum, self.step, self.name = spans
-        self.minimum, self.maximum = min(self.minimum, self.value), max(self.maximum, self.value)
-
-    @property
-    def value(self) -> float:
-        rules = self.scene.search.settings
-        if self.field in WEIGHTS:
-            return float(rules.weights[WEIGHTS.index(self.field)])
-        return float(getattr(rules, self.field))
-
-    def set(self, value: float) -> None:
-        """Errors: values that are not allowed."""
-        if self.field in WEIGHTS:
-            weights = list(self.scene.search.settings.weights)
-            weights[WEIGHTS.index(self.field)] = float(value)
-            self.scene.tune(weights=tuple(weights))
-        else:
-            self.scene.tune(**{self.field: float(value)})
-
-
-def search_controls(scene: Searching) -> list[SearchControl]:
-    """All numbers that may be tuned while a scene runs."""
-    return [SearchControl(scene, field) for field in (*WEIGHTS, *SEARCH_SPANS)]

@@ -9,17 +9,19 @@ from kumite.control.attack import Attack, thrown
 from kumite.control.avoidance import AvoidanceSearch, Outcome
 from kumite.control.avoider import standing
 from kumite.control.protocol import Controller
+from kumite.control.tuning import Tunable, find
 from kumite.errors import KumiteError
 from kumite.graph import Layer, Library
 from kumite.scene.avoiding import Avoiders, search_of
 from kumite.scene.balls import Balls
-from kumite.scene.controls import SearchControl, search_controls
+from kumite.scene.controls import reaction_tunables, search_tunables
 from kumite.scene.doors import check_scene
 from kumite.scene.events import Event, Searched
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.settings_dodge import BallsSettings, DodgeSettings
-from kumite.scene.stage import SceneObject
-from kumite.scene.throwing import Throwing
+from kumite.scene.stage import Offers, SceneObject
+from kumite.scene.throwing import ByHand, Throwing
+from kumite.scene.volumes import Volumes
 from kumite.synthesis import Cast
 
 
@@ -111,9 +113,29 @@ class DodgeScene:
         """Balls are thrown, not carried."""
 
     @property
-    def controls(self) -> list[SearchControl]:
-        """What of the search may be tuned while it runs."""
-        return search_controls(self)
+    def tunables(self) -> list[Tunable]:
+        """What may be tuned while it runs; searches under way keep their rules."""
+        side = self.side
+        return [
+            *reaction_tunables(self.names, side.avoiders),
+            *search_tunables(lambda: side.search, self.tune),
+        ]
+
+    def tunable(self, name: str) -> Tunable:
+        """One of them by name. Errors: there is none such."""
+        return find(self.tunables, name)
+
+    @property
+    def offers(self) -> Offers:
+        """What may be done with it while it runs."""
+        return Offers(
+            throwing=_ByHand(self),
+            avoiding=Volumes(dict(enumerate(self.side.avoiders)), lambda: self.cast),
+            tunables=tuple(self.tunables),
+            counts=("balls",),
+            seen="before",
+            yaw=float(self.cast.facing[0, 2]),
+        )
 
     def tune(self, **rules: object) -> None:
         """Other rules for the next searches; those under way keep theirs. Errors: values that are
@@ -169,3 +191,19 @@ class DodgeScene:
         if isinstance(event, Searched) and event.outcome == Outcome.FOUND:
             self.throwing.found(event.attack)
         self.events.append(event)
+
+
+class _ByHand(ByHand):
+    """A stream that is switched stays so when the scene begins again."""
+
+    def __init__(self, scene: DodgeScene) -> None:
+        super().__init__(lambda: scene.throwing, lambda: scene.frame)
+        self._scene = scene
+
+    @property
+    def streams(self) -> bool:
+        return self._scene.streams
+
+    @streams.setter
+    def streams(self, on: bool) -> None:
+        self._scene.streams = on

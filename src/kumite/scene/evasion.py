@@ -20,6 +20,7 @@ from kumite.control.attack import Attack
 from kumite.control.conductor import Conductor
 from kumite.control.counter import Counter, CounterFighter, CounterSearch, Opening
 from kumite.control.protocol import Controller
+from kumite.control.tuning import Tunable, find
 from kumite.errors import KumiteError
 from kumite.graph import Layer, Library
 from kumite.graph.spans import Spans
@@ -30,11 +31,19 @@ from kumite.scene.apart import held_apart, push_two
 from kumite.scene.attackers import Attackers, Blow, middle_of, skill_of
 from kumite.scene.avoiding import Avoiders, search_of
 from kumite.scene.blows import Blows, Contact
+from kumite.scene.controls import (
+    KEPT,
+    policy_tunables,
+    reaction_tunables,
+    search_tunables,
+    tunable,
+)
 from kumite.scene.doors import check_scene, layer_of
 from kumite.scene.events import Avoided, Event, Foreseen, Hit
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.settings_dodge import DodgeSettings
-from kumite.scene.stage import SceneObject
+from kumite.scene.stage import Offers, SceneObject
+from kumite.scene.volumes import Volumes
 from kumite.synthesis import Cast
 from kumite.synthesis.recoil import RECOIL
 
@@ -202,6 +211,36 @@ class EvasionScene:
 
     def move_object(self, name: str, position: np.ndarray) -> None:
         """There are none."""
+
+    @property
+    def tunables(self) -> list[Tunable]:
+        """What may be tuned while it runs, of those who avoid and of those who attack."""
+        side, count = self.side, self._dodgers_count
+
+        def keep(distance: float) -> None:
+            side.roamer.distance = distance
+
+        def kept() -> float:
+            return float(side.roamer.distance or 0.0)
+
+        return [
+            *reaction_tunables(self.names[:count], side.avoiders),
+            *search_tunables(lambda: side.search, side.tune),
+            tunable(KEPT, "", "avoid", "dodge.distance", kept, keep),
+            *policy_tunables(self.names[count:], self.attackers.fighters.tempers),
+        ]
+
+    def tunable(self, name: str) -> Tunable:
+        """One of them by name. Errors: there is none such."""
+        return find(self.tunables, name)
+
+    @property
+    def offers(self) -> Offers:
+        """What may be done with it while it runs."""
+        return Offers(
+            avoiding=Volumes(dict(enumerate(self.side.avoiders)), lambda: self.side.cast),
+            tunables=tuple(self.tunables),
+        )
 
     def step(self) -> bool:
         """One frame: controllers decide, all move, blows are tested."""

@@ -21,6 +21,7 @@ from kumite.control import (
     trained,
 )
 from kumite.control.protocol import Plain, View
+from kumite.control.tuning import Tunable
 from kumite.errors import KumiteError, unknown
 from kumite.graph import Layer
 from kumite.graph.spans import Spans, nearest
@@ -28,31 +29,11 @@ from kumite.kernels import crowd as kernels
 from kumite.kernels.character import MANY
 from kumite.rotation import rotate
 from kumite.scene import events
+from kumite.scene.controls import policy_tunables
 from kumite.scene.floor import Floor
 
 AIM = "head"
 ANTICIPATION = 0.4  # s of the other's motion that a fighter foresees; then it takes it to stand
-FEW_TO_TUNE = 4  # characters that each have their own sliders
-
-
-class WeightControl:
-    """The weight of a behaviour, of one character or of all: a control of the studio."""
-
-    minimum, maximum = 0.0, 12.0
-
-    def __init__(self, name: str, behaviour: str, tempers: Sequence[Temper]) -> None:
-        self.name = name
-        self.behaviour = behaviour
-        self.tempers = tempers
-
-    @property
-    def value(self) -> float:
-        return self.tempers[0].weight(self.behaviour)
-
-    def set(self, value: float) -> None:
-        """Errors: the last weight above 0 cannot be taken away."""
-        for temper in self.tempers:
-            temper.set_weight(self.behaviour, value)
 
 
 class PolicyFighter(Plain):
@@ -107,16 +88,12 @@ class PolicyFighter(Plain):
         self._like: np.ndarray | None = None  # [F] stretch after which one may go on
         self._alone = len(spans.layers) == 1
 
-    def controls(self, names: Sequence[str]) -> list[WeightControl]:
-        """What may be tuned while the world runs: each behaviour's weight."""
-        kinds = ("approach", "strike", *(p.behaviour.name for p in self.skill.more))
-        served = self.served
-        if len(served) > FEW_TO_TUNE:
-            tempers = [self.tempers[k] for k in served]
-            return [WeightControl(n, n, tempers) for n in kinds]
-        return [
-            WeightControl(f"{names[k]}: {n}", n, [self.tempers[k]]) for k in served for n in kinds
-        ]
+    def tunables(self, names: Sequence[str]) -> list[Tunable]:
+        """What may be tuned while the world runs, of those it serves."""
+        more = [p.behaviour.name for p in self.skill.more]
+        return policy_tunables(
+            [names[k] for k in self.served], [self.tempers[k] for k in self.served], more
+        )
 
     def begin(self, floor: Floor, things: np.ndarray, thing: np.ndarray, seed: int) -> None:
         """A world begins, or begins again: all stand on its floor. things [O, 4]: where hanging

@@ -12,6 +12,7 @@ from kumite.body import lay_body
 from kumite.clip import LIMBS
 from kumite.control.guide import learned_guide, seen
 from kumite.control.preparation import PreparationSettings
+from kumite.control.tuning import Tunable, find
 from kumite.errors import KumiteError, unknown
 from kumite.graph import Layer, Library
 from kumite.graph.preparing import Preparing
@@ -19,13 +20,14 @@ from kumite.kernels.blow import NO_BLOW, swept_contact
 from kumite.rotation import rotate
 from kumite.scene import events
 from kumite.scene.balls import capsules_of
+from kumite.scene.controls import CURVE, REST, tunable
 from kumite.scene.doors import check_scene
 from kumite.scene.events import Event, Hit, MovedGoal, Passed, Strike, Touched
 from kumite.scene.floor import TARGET_PARTS
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.opponents import NOBODY, Opponents, closing_in
 from kumite.scene.settings_prepare import PrepareSettings
-from kumite.scene.stage import SceneObject
+from kumite.scene.stage import Offers, SceneObject
 from kumite.scene.things import STRIKE, Things
 from kumite.scene.walkers import ARRIVED, NOTHING, ON_THE_WAY, Walkers
 from kumite.synthesis.preparation import curves
@@ -184,6 +186,71 @@ class PrepareScene:
     def move_object(self, name: str, position: np.ndarray) -> None:
         """Balls may be put elsewhere; obstacles stay."""
         self.things.move(name, position)
+
+    @property
+    def tunables(self) -> list[Tunable]:
+        """What may be tuned while it runs."""
+
+        def curve_of(part: str) -> float:
+            at = 0 if part == "legs" else self.skeleton.joint("head")
+            return float(self.prepare.curve.get(part, curves(self.skeleton)[at]))
+
+        def bend(part: str, value: float) -> None:
+            told = {**self.prepare.curve, part: value}
+            self.prepare = self.prepare.model_copy(update={"curve": told})
+            self.curve[:] = self._curves()
+
+        out = []
+        if self.prepare.preparation == "ours":
+            out += [
+                tunable(
+                    spec,
+                    "",
+                    "prepare",
+                    f"prepare.curve.{spec.field}",
+                    lambda part=spec.field: curve_of(part),
+                    lambda value, part=spec.field: bend(part, value),
+                )
+                for spec in CURVE
+            ]
+        foes = self.opponents
+        if foes.settings is not None:
+
+            def rest(seconds: float) -> None:
+                self.settings = self.settings.model_copy(
+                    update={
+                        "opponents": self.settings.opponents.model_copy(update={"rest": seconds})
+                    }
+                )
+                self.opponents.settings = self.settings.opponents
+
+            out.append(
+                tunable(
+                    REST,
+                    "",
+                    "world",
+                    "opponents.rest",
+                    lambda: float(self.opponents.settings.rest),
+                    rest,
+                )
+            )
+        return out
+
+    def tunable(self, name: str) -> Tunable:
+        """One of them by name. Errors: there is none such."""
+        return find(self.tunables, name)
+
+    @property
+    def offers(self) -> Offers:
+        from kumite.scene.leading import Walks
+
+        return Offers(
+            led=Walks(self, range(self.users)),
+            tunables=tuple(self.tunables),
+            counts=("errands",),
+            seen="behind",
+            yaw=float(self.walkers.facing[0, 2]),
+        )
 
     # What may be told by hand.
 

@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
 from kumite.brief import brief
 from kumite.checks import instance
 from kumite.clip import Skeleton
+from kumite.control.tuning import Tunable
+from kumite.scene.events import Launch, Throw
 from kumite.scene.recording import Event, Recording
+
+if TYPE_CHECKING:
+    from kumite.control import Progress, Route
+    from kumite.control.attack import Attack
+    from kumite.control.avoidance import Plan
+    from kumite.scene.actions import ActionPlayback
+    from kumite.scene.volumes import Volume
 
 RADIUS = 0.1  # m of an object of which a recording does not say it
 OUT_OF_SIGHT = np.array([0.0, -50.0, 0.0])  # m, of an object that is not there now
@@ -64,6 +73,172 @@ def in_sight(position: np.ndarray) -> np.ndarray:
 def _size(numbers: Sequence[float]) -> tuple[float, float, float]:
     width, height, length = numbers
     return float(width), float(height), float(length)
+
+
+# What a stage may offer. K characters; numbers of characters are rows of K.
+
+
+class Order(Protocol):
+    """Kinds and labels of actions that somebody is told."""
+
+    field: str  # wanted, unwanted or only
+
+    @property
+    def options(self) -> tuple[str, ...]: ...
+    @property
+    def value(self) -> tuple[str, ...]: ...
+    def set(self, names: Iterable[str]) -> None:
+        """Tell others. Errors: they cannot be told."""
+        ...
+
+
+class Directed(Protocol):
+    """Some may be sent along check points, and told which actions to do."""
+
+    @property
+    def directed(self) -> tuple[int, ...]:
+        """Who."""
+        ...
+
+    @property
+    def progress(self) -> Sequence[Progress | None]:
+        """How far each is on its route [K]."""
+        ...
+
+    def set_route(self, name: str, route: Route | None) -> None: ...
+    def move_check_point(self, name: str, index: int, place: tuple[float, float]) -> None: ...
+    def orders_of(self, k: int) -> Sequence[Order]: ...
+
+
+class Throwable(Protocol):
+    """Balls may be thrown at some."""
+
+    streams: bool  # whether balls come by themselves
+
+    @property
+    def thrown_at(self) -> tuple[int, ...]:
+        """Whom [n]."""
+        ...
+
+    @property
+    def ball_radius(self) -> float:
+        """Of those that come by themselves [m]."""
+        ...
+
+    def bodies(self) -> tuple[np.ndarray, np.ndarray]:
+        """Their bodies as spheres now: centres [n, B, 3] and radii [B], m."""
+        ...
+
+    def throw(
+        self,
+        position: np.ndarray,
+        goal: np.ndarray,
+        speed: float,
+        at: int = 0,
+        radius: float | None = None,
+    ) -> None:
+        """From a place [3] by a goal [3], meant for character ``at``. Errors: it makes no sense."""
+        ...
+
+    def throw_one(self, speed: float | None = None, radius: float | None = None) -> None: ...
+
+
+class Avoiding(Protocol):
+    """Some avoid, and the volumes that they reckon with can be seen."""
+
+    @property
+    def avoiding(self) -> tuple[int, ...]:
+        """Who."""
+        ...
+
+    def body(self, k: int) -> Volume: ...
+    def attacks(self) -> dict[int, Attack]:
+        """Those under way that anybody still minds, by number."""
+        ...
+
+    def plan(self, k: int) -> Plan | None: ...
+    def left(self, k: int) -> Volume:
+        """What its plan makes its body leave."""
+        ...
+
+
+class Preparation(NamedTuple):
+    """How far somebody is prepared, for what, and where that is begun."""
+
+    chosen: float  # level
+    shown: float
+    prepares: str | None  # the motion
+    does: str | None
+    away: float | None  # m to its place
+    goal: np.ndarray | None  # [2] m, x and z
+    begins: np.ndarray | None  # [3] the facing frame in which the motion is begun
+
+
+class Reference(NamedTuple):
+    """The posture that a motion is prepared for, in its facing frame."""
+
+    position: np.ndarray  # [J, 3] m
+    wxyz: np.ndarray  # [J, 4]
+    hull: np.ndarray  # [n, 2] m, corners of the support area in turn, x and z; n may be 0
+    centre: np.ndarray  # [2] m, the centre of mass on the ground
+    about: str  # which frame it is
+
+
+class Led(Protocol):
+    """Some go where they are sent, and prepare for what they do there. Rows n are of ``led``."""
+
+    automatic: bool  # they go by themselves where they are not sent
+
+    @property
+    def led(self) -> tuple[int, ...]:
+        """Who [n]."""
+        ...
+
+    @property
+    def motions(self) -> tuple[str, ...]: ...
+    @property
+    def things(self) -> tuple[str, ...]:
+        """What they may be sent to."""
+        ...
+
+    def go(self, k: int, place: np.ndarray) -> np.ndarray: ...
+    def go_to(self, k: int, name: str) -> None: ...
+    def trigger(self, k: int, motion: str) -> bool: ...
+    def place(self, n: int) -> np.ndarray:
+        """Where it is [2] m."""
+        ...
+
+    def sent(self, n: int) -> bool:
+        """Whether the hand sends it to a place now."""
+        ...
+
+    def prepared(self, n: int) -> Preparation: ...
+    def reference(self, motion: str) -> Reference: ...
+
+
+@dataclass(frozen=True)
+class Offers:
+    """What can be done with a stage, besides watching it. What is None has nothing of the kind.
+
+    Whoever shows a stage goes by this, and does not ask which scene it is.
+    """
+
+    directed: Directed | None = None
+    throwing: Throwable | None = None
+    avoiding: Avoiding | None = None
+    led: Led | None = None
+    tunables: tuple[Tunable, ...] = ()
+    counts: tuple[Literal["blows", "balls", "errands"], ...] = ("blows",)  # what a score is kept of
+    seen: Literal["beside", "before", "behind"] = "beside"  # from where, at first …
+    yaw: float = 0.0  # … of whoever faces that way [rad]
+    played: Playback | None = None  # a recording that can be wound
+    listed: ActionPlayback | None = None  # actions to choose from
+
+
+def offers_of(stage: Stage) -> Offers:
+    """What a stage offers: its ``offers``; a stage without can only be watched."""
+    found: Any = getattr(stage, "offers", None)
+    return found if isinstance(found, Offers) else Offers()
 
 
 class Stage(Protocol):
@@ -127,6 +302,13 @@ class Playback:
         self.unarmed = tuple(recording.settings.get("unarmed", ()))
         self.objects = recorded_objects(recording)
         self.load(recording)
+
+    @property
+    def offers(self) -> Offers:
+        """It can be wound; the score is of what happens in it."""
+        kinds = {type(e) for e in self.recording.events}
+        counts = ("balls",) * (Throw in kinds) + ("errands",) * (Launch in kinds)
+        return Offers(counts=counts or ("blows",), played=self)
 
     def load(self, recording: Recording) -> None:
         """Show another recording of the same characters and objects, from its start."""

@@ -31,7 +31,7 @@ from kumite.kernels.blow import NO_BLOW, NOBODY
 from kumite.kernels.moves import FALL, NOTHING
 from kumite.rotation import planar_compose
 from kumite.scene import events
-from kumite.scene.controls import ORDERS, OrderControl, StyleControl, check_orders, style_controls
+from kumite.scene.controls import ORDERS, OrderControl, check_orders
 from kumite.scene.events import Caught, CheckPointMissed, CheckPointReached
 from kumite.scene.floor import Floor
 from kumite.scene.reactions import Reactions
@@ -312,10 +312,6 @@ class TreeFighter(Plain):
             for f in ORDERS
         ]
 
-    def controls_of(self, k: int) -> list[StyleControl]:
-        """Numbers of one fighter that may be tuned while it fights."""
-        return style_controls(self.names[k], self.players[k])
-
     def take_cue(self, k: int, cue: CueSettings) -> None:
         """Character k fights otherwise from its next decision on."""
         for field in ("style", "depth", "wanted", "unwanted", "only"):
@@ -334,11 +330,12 @@ class TreeFighter(Plain):
         place, opponent = self.cast.root_position[:, [0, 2]], self.floor.opponent
         far = np.linalg.norm(place - place[opponent], axis=1)
         wants = np.array([p.style.preferred_distance for p in self.players])
-        near = (far < self.bout.catch) & (wants < wants[opponent])
+        caught = self.tree.rules.catch
+        near = (far < caught) & (wants < wants[opponent])
         for k in np.flatnonzero(near & ~self._caught).tolist():
             victim, distance = self.names[opponent[k]], float(far[k])
             self._tell(Caught(self.frame, self.names[k], victim=victim, distance=distance))
-        self._caught = near | (self._caught & (far < FREE * self.bout.catch))
+        self._caught = near | (self._caught & (far < FREE * caught))
 
     def pass_check_points(self) -> None:
         """Who has come to a check point, or has missed one, is told."""

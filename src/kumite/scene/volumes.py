@@ -6,14 +6,14 @@ body was as the avoidance part began, and no longer is.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from kumite.body import Spheres
 from kumite.control.attack import Attack
-from kumite.control.avoidance import AvoidanceSearch, Standing
+from kumite.control.avoidance import AvoidanceSearch, Plan, Standing
 from kumite.control.avoider import Avoider, standing
 from kumite.rotation import planar_apply, planar_compose, planar_inverse
 from kumite.synthesis import Cast
@@ -51,6 +51,30 @@ def avoidance_volume(cast: Cast, k: int, avoider: Avoider) -> Volume:
         return Volume(np.zeros((0, 3)), np.zeros(0))
     here = standing(cast, k, int(cast.stop[k]))
     return left_behind(avoider.search, here, avoider.rest, avoider.plan.part)
+
+
+class Volumes:
+    """Of those of a stage who avoid. Follows :class:`~kumite.scene.stage.Avoiding`."""
+
+    def __init__(self, avoiders: Mapping[int, Avoider], cast: Callable[[], Cast]) -> None:
+        """avoiders: by the numbers of their characters in a cast."""
+        self._avoiders, self._cast = avoiders, cast
+
+    @property
+    def avoiding(self) -> tuple[int, ...]:
+        return tuple(sorted(self._avoiders))
+
+    def body(self, k: int) -> Volume:
+        return body_volume(self._cast(), k, self._avoiders[k].search.spheres)
+
+    def attacks(self) -> dict[int, Attack]:
+        return attacks_on(self._avoiders.values())
+
+    def plan(self, k: int) -> Plan | None:
+        return self._avoiders[k].plan
+
+    def left(self, k: int) -> Volume:
+        return avoidance_volume(self._cast(), k, self._avoiders[k])
 
 
 def left_behind(

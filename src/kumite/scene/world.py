@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from kumite.control.conductor import Conductor, ControllerError
 from kumite.control.engage import Engage
 from kumite.control.game_tree import CALM, Decision, GameTree
 from kumite.control.protocol import SELF, Controller, External, View
+from kumite.control.tuning import Tunable, find
 from kumite.errors import KumiteError, unknown
 from kumite.graph import Layer, Library
 from kumite.graph.spans import Spans, nearest
@@ -31,11 +31,18 @@ from kumite.kernels.moves import FALL, NOTHING
 from kumite.scene import events
 from kumite.scene.apart import push_apart
 from kumite.scene.avoiding import search_of, searched
-from kumite.scene.controls import OrderControl
+from kumite.scene.controls import (
+    OrderControl,
+    reaction_tunables,
+    rule_tunables,
+    search_tunables,
+    tree_tunables,
+)
 from kumite.scene.doors import check_scene, check_settings
 from kumite.scene.events import Cue, Event, Hit, RunOver
 from kumite.scene.floor import Floor, Landing
 from kumite.scene.hanging import Hanging
+from kumite.scene.leading import Walks
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.needs import wanted_layers
 from kumite.scene.pairs import pair_up
@@ -46,11 +53,12 @@ from kumite.scene.settings import SceneSettings
 from kumite.scene.settings_base import ARENA, NEAREST
 from kumite.scene.settings_dodge import BallsSettings, DodgeSettings
 from kumite.scene.settings_fight import CHANGES, BoutSettings, CueSettings
-from kumite.scene.stage import SceneObject
+from kumite.scene.stage import Offers, SceneObject
 from kumite.scene.starts import draw_starts, stream
 from kumite.scene.story import Story
-from kumite.scene.throwing import Throwing
+from kumite.scene.throwing import ByHand, Throwing
 from kumite.scene.tree_fighter import TreeFighter
+from kumite.scene.volumes import Volumes
 from kumite.synthesis.recoil import RECOIL
 
 REPAIRING = 1.0  # s after which those who aim at the nearest look round again
@@ -327,17 +335,61 @@ class World:
     # What may be told while it runs --------------------------------------------------------------
 
     @property
-    def controls(self) -> list[Any]:
-        """Numbers that may be tuned while the world runs."""
-        tree = [c for k in range(len(self.names)) for c in self.controls_of(k)]
-        policy = [] if self.policy is None else self.policy.controls(self.names)
-        return tree + policy
+    def tunables(self) -> list[Tunable]:
+        """Numbers that may be tuned while the world runs, of every controller and of the world."""
+        out: list[Tunable] = []
+        if self.fight is not None:
+            for k in self.directed:
+                out += tree_tunables(self.names[k], self.fight.players[k], self.fight.tree)
+        if self.policy is not None:
+            out += self.policy.tunables(self.names)
+        if self._avoiders:
+            avoiders = [self._avoiders[k] for k in sorted(self._avoiders)]
 
-    def controls_of(self, k: int) -> list[Any]:
-        """Numbers of one who fights by game tree."""
-        if self.fight is None or not self.settings.people[k].by_tree:
-            return []
-        return self.fight.controls_of(k)
+            def tune(**rules: object) -> None:
+                search = avoiders[0].search.tuned(**rules)
+                for avoider in avoiders:
+                    avoider.search = search
+
+            out += reaction_tunables([self.names[k] for k in sorted(self._avoiders)], avoiders)
+            out += search_tunables(lambda: avoiders[0].search, tune)
+        if self._preparer is not None:
+            out += self._preparer.scene.tunables
+        return out if self.fight is None else [*out, *rule_tunables(self.fight.tree)]
+
+    def tunable(self, name: str) -> Tunable:
+        """One of them by name, ``red: tree: depth``. Errors: there is none such."""
+        return find(self.tunables, name)
+
+    @property
+    def directed(self) -> tuple[int, ...]:
+        """Who fights by game tree, and may be sent along check points."""
+        people = self.settings.people
+        return tuple(k for k, p in enumerate(people) if self.fight is not None and p.by_tree)
+
+    @property
+    def offers(self) -> Offers:
+        """What may be done with it while it runs."""
+        preparer, throwing = self._preparer, self._throwing is not None
+        fights = self.fight is not None or self.policy is not None
+        return Offers(
+            directed=self if self.directed else None,
+            throwing=ByHand(self._throws, lambda: self.frame) if throwing else None,
+            avoiding=Volumes(self._avoiders, lambda: self.cast) if throwing else None,
+            led=None if preparer is None else Walks(preparer.scene, preparer.who),
+            tunables=tuple(self.tunables),
+            counts=(
+                *(("blows",) if fights else ()),
+                *(("balls",) if throwing else ()),
+                *(("errands",) if preparer is not None else ()),
+            ),
+            seen="beside" if fights else "before" if throwing else "behind",
+            yaw=float(self.cast.facing[0, 2]),
+        )
+
+    def _throws(self) -> Throwing:
+        assert self._throwing is not None  # somebody avoids
+        return self._throwing
 
     def orders_of(self, k: int) -> list[OrderControl]:
         """What one who fights by game tree is told of actions: A⁺, A⁻ and the action set."""
@@ -446,7 +498,7 @@ class World:
         if self.fight is not None:
             self.fight.frame = self.frame
             self.fight.pass_check_points()
-            if self.bout.catch:
+            if self.fight.tree.rules.catch:
                 self.fight.catch()
         if happened:
             strikes = self.library.strikes

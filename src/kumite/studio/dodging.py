@@ -1,47 +1,24 @@
-"""The panel's part for scenes in which balls are thrown: by hand or not, and what is seen of it."""
+"""The panel's parts for balls that are thrown, and for what is seen of avoiding them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import viser
 
-from kumite.studio.doors import Safely, a_place, a_way
+from kumite.studio.doors import Safely
+from kumite.studio.sliders import Director
 from kumite.studio.throwing import FASTEST, LARGEST, SLOWEST, SMALLEST, Throws
 from kumite.studio.volumes import Volumes
 
 
-class Thrower(Protocol):
-    """What the studio does for it; every call is safe from any thread."""
-
-    def direct(self, act: Callable[[], Any]) -> Any:
-        """Do something to the stage between two frames, and show it."""
-        ...
-
-    def wake(self) -> None:
-        """Look at what was asked for."""
-        ...
-
-    def from_page(self, point: Any) -> Any:
-        """Where a point [3] m of the page's world lies on the stage."""
-        ...
-
-
-class Dodging:
-    """Clicks that throw, how they do, and switches for the volumes."""
+class ThrowPanel:
+    """How balls are thrown, and whether they come by themselves."""
 
     def __init__(
-        self,
-        server: viser.ViserServer,
-        throws: Throws,
-        volumes: Volumes,
-        studio: Thrower,
-        safely: Safely,
+        self, gui: viser.GuiApi, throws: Throws, director: Director, safely: Safely
     ) -> None:
-        self._scene, self._throws, self._shown = throws.scene, throws, volumes.shown
-        self._studio, scene, shown = studio, throws.scene, volumes.shown
-        gui = server.gui
+        self._throws, self._director = throws, director
         with gui.add_folder("Throw"):
             gui.add_html(
                 '<div style="padding:0 1em .5em;font-size:.85em;opacity:.75">'
@@ -56,45 +33,52 @@ class Dodging:
             )
             radius.on_update(safely(lambda e: throws.set_radius(e.target.value)))
             one = gui.add_button("Throw one by itself", hint="from before somebody, at a body part")
-            one.on_click(safely(self._one))
+            one.on_click(safely(lambda _: director.direct(throws.one)))
             self._stream = gui.add_checkbox(
-                "Stream", scene.streams, hint="balls that come by themselves, one after the other"
+                "Stream",
+                throws.at.streams,
+                hint="balls that come by themselves, one after the other",
             )
             self._stream.on_update(safely(self._set_stream))
-        with gui.add_folder("Volumes"):
-            if len(scene.names) > 1:
-                whose = gui.add_dropdown("Of", scene.names, hint="whose volumes are shown")
-                whose.on_update(safely(lambda e: self._show(who=scene.names.index(e.target.value))))
+
+    def _set_stream(self, event: Any) -> None:
+        if event.client is not None:  # the panel switches it, too
+            on = bool(event.target.value)
+            self._director.direct(lambda: setattr(self._throws.at, "streams", on))
+
+    def show(self) -> None:
+        """A stream that has run dry is off."""
+        if self._stream.value != self._throws.at.streams:
+            self._stream.value = self._throws.at.streams
+
+
+class VolumesPanel:
+    """Switches for the volumes of the character chosen."""
+
+    def __init__(
+        self, gui: viser.GuiApi, volumes: Volumes, director: Director, safely: Safely
+    ) -> None:
+        self._volumes, self._director = volumes, director
+        self.folder = gui.add_folder("Volumes", expand_by_default=False)
+        with self.folder:
             for field, label, hint in (
                 ("body", "Body volume", "the spheres that stand for the body"),
                 ("attacks", "Attack volume", "attacks under way, all along their paths"),
                 ("left", "Avoidance volume", "what the body is about to leave, or has left"),
             ):
-                switch = gui.add_checkbox(label, getattr(shown, field), hint=hint)
+                switch = gui.add_checkbox(label, getattr(volumes.shown, field), hint=hint)
                 switch.on_update(
                     safely(lambda e, field=field: self._show(**{field: e.target.value}))
                 )
-        server.scene.on_click()(safely(self._click))
 
-    def _click(self, event: viser.SceneClickEvent) -> None:
-        way = a_way("click", event.ray_direction)  # the page's world is not turned
-        self._throws.click(self._studio.from_page(a_place("click", event.ray_origin)), way)
-        self._studio.wake()
-
-    def _one(self, event: Any) -> None:
-        self._throws.one()
-        self._studio.wake()
-
-    def _set_stream(self, event: Any) -> None:
-        if event.client is not None:  # the panel switches it, too
-            self._studio.direct(lambda: setattr(self._scene, "streams", bool(event.target.value)))
+    def choose(self, who: int) -> None:
+        """Show another character's."""
+        self.folder.visible = who in self._volumes.avoiding.avoiding
+        self._show(who=who)
 
     def _show(self, **switches: Any) -> None:
-        for name, value in switches.items():
-            setattr(self._shown, name, value)
-        self._studio.wake()
+        def switch() -> None:
+            for name, value in switches.items():
+                setattr(self._volumes.shown, name, value)
 
-    def show(self) -> None:
-        """A stream that has run dry is off."""
-        if self._stream.value != self._scene.streams:
-            self._stream.value = self._scene.streams
+        self._director.direct(switch)

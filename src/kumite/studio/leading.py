@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kumite.rotation import from_yaw, rotate
-from kumite.scene import PrepareScene, SceneObject
+from kumite.scene.stage import Led, SceneObject
 from kumite.studio.doors import a_place
 from kumite.studio.paths import on_floor
 
@@ -76,35 +76,35 @@ def way_seen(eye: np.ndarray, look_at: np.ndarray, up: np.ndarray, key: str) -> 
 class Leader:
     """Who is led, and what it is told; the caller keeps the scene from stepping meanwhile."""
 
-    scene: PrepareScene
-    who: int = 0
+    walk: Led
+    names: Sequence[str]  # of all on the stage
+    who: int = 0  # a row of those who are led
 
     @property
     def name(self) -> str:
-        return self.scene.names[self.who]
+        return self.names[self.walk.led[self.who]]
 
     @property
     def led(self) -> bool:
         """Whether the hand sends it to a place now."""
-        return bool(np.isfinite(self.scene.told[self.who, 0]))
+        return self.walk.sent(self.who)
 
-    def point(self, eye: np.ndarray, way: np.ndarray) -> None:
-        """Send it to what a ray [3], [3] means."""
-        scene = self.scene
-        what = meant(eye, way, scene.objects, scene.things.names)
+    def point(self, eye: np.ndarray, way: np.ndarray, objects: Sequence[SceneObject]) -> None:
+        """Send it to what a ray [3], [3] means. objects: where they were seen."""
+        what = meant(eye, way, objects, self.walk.things)
         if isinstance(what, str):
-            scene.go_to(self.who, what)
+            self.walk.go_to(self.who, what)
         elif what is not None:
             x, _, z = a_place("goal", [what[0], 0.0, what[1]])
-            scene.go(self.who, np.array([x, z]))
+            self.walk.go(self.who, np.array([x, z]))
 
     def press(self, eye: np.ndarray, look_at: np.ndarray, up: np.ndarray, key: str) -> None:
         """Send it into the direction of an arrow as a camera sees it."""
-        here = self.scene.walkers.facing[self.who, :2]
-        self.scene.go(self.who, here + STEP * way_seen(eye, look_at, up, key))
+        here = self.walk.place(self.who)
+        self.walk.go(self.who, here + STEP * way_seen(eye, look_at, up, key))
 
     def trigger(self, motion: str) -> str | None:
         """Let it do a target motion; else what it is busy with."""
-        if self.scene.trigger(self.who, motion):
+        if self.walk.trigger(self.who, motion):
             return None
-        return self.scene.motions[int(self.scene.walkers.doing[self.who])]
+        return self.walk.prepared(self.who).does

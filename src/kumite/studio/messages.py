@@ -222,7 +222,9 @@ def _check_control(message: Mapping[str, Any], server: viser.ViserServer) -> Non
     if not isinstance(updates, dict) or updates.keys() != {"value"}:
         raise Refused("something of a control besides its value")
     # Not a public name: viser finds the control by it, so the check must, too.
-    handle = server.gui._gui_input_handle_from_uuid.get(message["uuid"])
+    pages = [server.gui, *(client.gui for client in server.get_clients().values())]
+    found = (gui._gui_input_handle_from_uuid.get(message["uuid"]) for gui in pages)
+    handle = next((h for h in found if h is not None), None)
     if handle is None or handle.disabled or not handle.visible:
         raise Stale
     value_of = VALUES.get(type(handle))

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, Protocol, runtime_checkable
+from collections.abc import Callable
+from typing import Any, Protocol
 
 import viser
 
-from kumite.scene.actions import ActionPlayback
-from kumite.scene.world import World
+from kumite.scene.stage import Offers, Stage
 from kumite.studio.action_list import ActionList
 from kumite.studio.coming import Banner, Coming
-from kumite.studio.direction import Direction, Director
-from kumite.studio.dodging import Dodging, Thrower
+from kumite.studio.direction import Direction
+from kumite.studio.dodging import ThrowPanel, VolumesPanel
 from kumite.studio.doors import LARGEST_SEED, safely, within
 from kumite.studio.leading import Leader
 from kumite.studio.paths import Sketch
 from kumite.studio.reference import Prepared
+from kumite.studio.ring import Follow
+from kumite.studio.sliders import Director, Sliders
 from kumite.studio.throwing import Throws
 from kumite.studio.volumes import Volumes
 from kumite.studio.walking import Walking
@@ -25,23 +26,24 @@ from kumite.studio.wording import EventLog, lines_html, score_html
 SLOWEST, FASTEST = 0.1, 4.0
 TIME_STEP = 0.01  # s
 WIDTH = 330.0  # px
+SENDS, THROWS = "sends", "throws"  # what a click does where it may do either
 
 
-@runtime_checkable
-class Control(Protocol):
-    """Something of a stage that can be tuned while it runs."""
+def prepare(gui: viser.GuiApi, title: str) -> None:
+    """How the panels of all pages look."""
+    gui.configure_theme(
+        dark_mode=True,
+        show_logo=False,
+        show_share_button=False,
+        brand_color=(214, 48, 49),
+        control_width="medium",
+    )
+    gui.set_panel_label(f"Kumite · {title}")
+    gui.main_panel.dock_right()
+    gui.main_panel.set_width(WIDTH)
 
-    name: str
-    minimum: float
-    maximum: float
-    value: float
 
-    def set(self, value: float) -> None:
-        """Use ``value`` from the next frame on."""
-        ...
-
-
-class Desk(Director, Thrower, Protocol):
+class Desk(Director, Protocol):
     """What the panel's buttons reach; every call is safe from any thread."""
 
     def toggle(self) -> None:
@@ -64,99 +66,99 @@ class Desk(Director, Thrower, Protocol):
         """Play an action of a library."""
         ...
 
-    def set_speed(self, speed: float) -> None:
+    @property
+    def speed(self) -> float:
         """Seconds of the scene in a second."""
         ...
 
-    def set_follow(self, on: bool) -> None:
-        """Keep the fighters in the middle, or let them walk."""
-        ...
-
-    def show_decisions(self, on: bool) -> None:
-        """List decisions among the events."""
-        ...
-
-    def tune(self, control: Control, value: float) -> None:
-        """Set a control of the stage."""
+    def set_speed(self, speed: float) -> None:
+        """Another speed."""
         ...
 
 
-class Panel:
-    """Controls, score and events on the right of the page."""
+class Own:
+    """What belongs to one page: what it follows, draws, throws, leads and looks at."""
 
     def __init__(
         self,
-        server: viser.ViserServer,
-        desk: Desk,
-        *,
-        title: str,
-        seed: int,
-        frames: int | None,
-        fps: float,
-        controls: Sequence[Control],
-        actions: ActionPlayback | None = None,
-        fight: World | None = None,
-        sketch: Sketch | None = None,
+        follow: Follow,
         throws: Throws | None = None,
         volumes: Volumes | None = None,
         leader: Leader | None = None,
         prepared: Prepared | None = None,
-        coming: Coming | None = None,
     ) -> None:
-        self._fps = fps
-        self._shown: dict[str, Any] = {}
-        gui = server.gui
-        gui.configure_theme(
-            dark_mode=True,
-            show_logo=False,
-            show_share_button=False,
-            brand_color=(214, 48, 49),
-            control_width="medium",
-        )
-        gui.set_panel_label(f"Kumite · {title}")
-        gui.main_panel.dock_right()
-        gui.main_panel.set_width(WIDTH)
+        self.follow, self.sketch = follow, Sketch()
+        self.throws, self.volumes = throws, volumes
+        self.leader, self.prepared = leader, prepared
+        self.sends = leader is not None  # a click sends somebody; otherwise it throws
+        self.decisions = False  # listed among the events
 
-        self._banner = None if coming is None else Banner(gui, coming, title)
+
+class Panel:
+    """Controls, score and events on the right of a page; a part for each thing a stage offers."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        desk: Desk,
+        own: Own,
+        stage: Stage,
+        offers: Offers,
+        coming: Coming | None,
+        eye: Callable[[Any], Any],
+    ) -> None:
+        """own: the page's. eye: where the camera [3] of an event's page is on the stage."""
+        self._fps, self._own = stage.fps, own
+        self._shown: dict[str, Any] = {}
+        self._banner = None if coming is None else Banner(gui, coming, stage.title)
         self._play = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE, hint="space")
         self._play.on_click(safely(lambda _: desk.toggle()))
         more = gui.add_button_group("", ("Step", "Restart"), hint="N: one frame on · R: restart")
         more.on_click(
             safely(lambda e: desk.step_once() if e.target.value == "Step" else desk.restart())
         )
-        speed = gui.add_slider("Speed", SLOWEST, FASTEST, step=0.1, initial_value=1.0)
-        speed.on_update(safely(lambda e: desk.set_speed(e.target.value)))
+        self._speed = gui.add_slider("Speed", SLOWEST, FASTEST, step=0.1, initial_value=desk.speed)
+        self._speed.on_update(safely(lambda e: _by_hand(e, desk.set_speed)))
         self._timeline: viser.GuiSliderHandle[float] | None = None
-        if frames is None:
-            number = gui.add_number(
-                "Seed", seed, min=0, max=max(seed, LARGEST_SEED), step=1, hint="restarts"
+        self._seed: viser.GuiNumberHandle[int] | None = None
+        if offers.played is None:
+            most = max(stage.seed, LARGEST_SEED)
+            self._seed = gui.add_number(
+                "Seed", stage.seed, min=0, max=most, step=1, hint="restarts"
             )
-            number.on_update(safely(lambda e: desk.restart(int(e.target.value))))
+            self._seed.on_update(safely(lambda e: _by_hand(e, lambda n: desk.restart(int(n)))))
         else:
-            last = _last(frames, fps)
+            last = _last(len(offers.played.recording), stage.fps)
             self._timeline = gui.add_slider("Time", 0.0, last, step=TIME_STEP, initial_value=0.0)
-            self._timeline.on_update(safely(lambda e: _seek(desk, e, fps)))
+            self._timeline.on_update(safely(lambda e: _seek(desk, e, stage.fps)))
         follow = gui.add_checkbox("Follow", True, hint="keep the fighters in the middle")
-        follow.on_update(safely(lambda e: desk.set_follow(e.target.value)))
+        follow.on_update(safely(lambda e: desk.direct(lambda: _set(own.follow, "on", e))))
         self._clock = gui.add_html("")
-        self._dodging: Dodging | None = None
-        if throws is not None and volumes is not None:
-            self._dodging = Dodging(server, throws, volumes, desk, safely)
-        self._walking: Walking | None = None
-        if leader is not None and prepared is not None:
-            self._walking = Walking(server, leader, prepared, desk, safely)
-        self._direction: Direction | None = None
-        if fight is not None and sketch is not None:
-            with gui.add_folder("Direction"):
-                self._direction = Direction(server, fight, sketch, desk, safely)
-        elif controls:
-            with gui.add_folder("Parameters", expand_by_default=throws is None):
-                for control in controls:
-                    _add_control(gui, desk, control)
+        self._throwing = self._volumes = self._walking = self._direction = self._sliders = None
+        # A panel for each thing that the stage offers.
+        some = _named(stage, offers)
+        if len(some) > 1:
+            who = gui.add_dropdown("Character", some, hint="who is directed, and shown below")
+            who.on_update(safely(lambda e: self._choose(e.target.value, stage)))
+        if own.leader is not None and own.throws is not None:
+            click = gui.add_dropdown("A click", (SENDS, THROWS), hint="into the picture")
+            click.on_update(safely(lambda e: setattr(own, "sends", e.target.value == SENDS)))
+        if own.throws is not None:
+            self._throwing = ThrowPanel(gui, own.throws, desk, safely)
+        if own.volumes is not None:
+            self._volumes = VolumesPanel(gui, own.volumes, desk, safely)
+        if own.leader is not None and own.prepared is not None:
+            self._walking = Walking(gui, own.leader, own.prepared, desk, safely, eye)
+        if offers.directed is not None:
+            self._direction = Direction(gui, stage, offers.directed, own.sketch, desk, safely)
+        if offers.tunables:
+            self._sliders = Sliders(gui, lambda: offers.tunables, desk, safely)
+        if some:
+            self._choose(some[0], stage)
         self._score = None
-        if actions is not None:
+        if offers.listed is not None:
             with gui.add_folder("Actions"):
-                listed = ActionList(gui, actions, desk.choose)
+                listed = ActionList(gui, offers.listed, desk.choose)
                 listed.listen(safely)
             _add_keys(gui, _moves(listed))
         else:
@@ -164,10 +166,20 @@ class Panel:
                 self._score = gui.add_html("")
         with gui.add_folder("Events"):
             self._lines = gui.add_html("")
-            if actions is None:
+            if offers.listed is None:
                 decisions = gui.add_checkbox("Decisions", False, hint="list every decision as well")
-                decisions.on_update(safely(lambda e: desk.show_decisions(e.target.value)))
+                decisions.on_update(
+                    safely(lambda e: desk.direct(lambda: _set(own, "decisions", e)))
+                )
         _add_keys(gui, _runs(desk))
+
+    def _choose(self, name: str, stage: Stage) -> None:
+        k = stage.names.index(name)
+        for part in (self._direction, self._walking, self._volumes):
+            if part is not None:
+                part.choose(k)
+        if self._sliders is not None:
+            self._sliders.show_of(name)
 
     def look_out(self) -> bool:
         """Say how far what is coming is; whether that has changed."""
@@ -180,8 +192,12 @@ class Panel:
             self._timeline.value = 0.0
             self._timeline.max = _last(frames, self._fps)
 
-    def playing(self, playing: bool) -> None:
-        """Label the button for what it does next."""
+    def playing(self, playing: bool, speed: float, seed: int) -> None:
+        """Label the button for what it does next; other pages may have set the speed and seed."""
+        if self._speed.value != speed:
+            self._speed.value = speed
+        if self._seed is not None and self._seed.value != seed:
+            self._seed.value = seed
         if self._shown.get("playing") != playing:
             self._shown["playing"] = playing
             self._play.label = "Pause" if playing else "Play"
@@ -198,14 +214,16 @@ class Panel:
         )
         if self._direction is not None:
             self._direction.show()
-        if self._dodging is not None:
-            self._dodging.show()
+        if self._throwing is not None:
+            self._throwing.show()
+        if self._sliders is not None:
+            self._sliders.refresh()
         if self._walking is not None:
             self._walking.show()
         for name, handle, content in (
             ("clock", self._clock, clock),
             ("score", self._score, score_html(log)),
-            ("lines", self._lines, lines_html(log, self._fps)),
+            ("lines", self._lines, lines_html(log, self._fps, self._own.decisions)),
         ):
             if handle is not None and self._shown.get(name) != content:
                 self._shown[name] = content
@@ -223,16 +241,26 @@ def _seek(desk: Desk, event: Any, fps: float) -> None:
         desk.seek(round(within("time", event.target.value, 0.0, event.target.max) * fps))
 
 
-def _add_control(gui: viser.GuiApi, desk: Desk, control: Control) -> None:
-    span = control.maximum - control.minimum
-    slider = gui.add_slider(
-        control.name,
-        control.minimum,
-        control.maximum,
-        step=getattr(control, "step", span / 100 if span > 0 else 1.0),
-        initial_value=control.value,
-    )
-    slider.on_update(safely(lambda e: desk.tune(control, float(e.target.value))))
+def _by_hand(event: Any, act: Callable[[float], Any]) -> None:
+    """The panel sets its controls, too; only a person's move is a wish."""
+    if event.client is not None:
+        act(event.target.value)
+
+
+def _set(holder: Any, name: str, event: Any) -> None:
+    setattr(holder, name, bool(event.target.value))
+
+
+def _named(stage: Stage, offers: Offers) -> tuple[str, ...]:
+    """Those of whom something can be chosen."""
+    found = {t.who for t in offers.tunables if t.who}
+    for some in (
+        offers.directed and offers.directed.directed,
+        offers.led and offers.led.led,
+        offers.avoiding and offers.avoiding.avoiding,
+    ):
+        found |= {stage.names[k] for k in some or ()}
+    return tuple(name for name in stage.names if name in found)
 
 
 Keys = tuple[tuple[str, Any, Callable[[], None]], ...]

@@ -79,10 +79,10 @@ class Paths:
         self,
         server: viser.ViserServer,
         names: Sequence[str],
-        moved: Callable[[int, int, np.ndarray, np.ndarray], None],
+        moved: Callable[[int, int, int, np.ndarray, np.ndarray], None],
     ) -> None:
-        """names: of all fighters. moved: told whose check point is dragged, which, and the ray [3],
-        [3] in the page's world that points to its new place.
+        """names: of all fighters. moved: told which page drags whose check point, which one, and
+        the ray [3], [3] in the page's world that points to its new place.
         """
         self._scene = server.scene
         self._moved = moved
@@ -90,7 +90,15 @@ class Paths:
         self._shown: dict[int, Path] = {}
         self._handles: dict[int, list[viser.SceneNodeHandle]] = {}
         self._disc = _disc()
-        self.held = False  # somebody is dragging: the ground must not slide away
+        self._held: set[int] = set()  # pages that drag one
+
+    def held(self, page: int) -> bool:
+        """Whether a page drags one: its ground must not slide away under the pointer."""
+        return page in self._held
+
+    def let_go(self, page: int) -> None:
+        """A page has gone, whatever it held."""
+        self._held.discard(page)
 
     def draw(self, paths: Iterable[Path]) -> None:
         """Show these, and no others."""
@@ -156,12 +164,58 @@ class Paths:
             self._handles[who].append(line)
 
     def _drag(self, who: int, event: viser.SceneNodeDragEvent) -> None:
-        self.held = event.phase != "end"
+        (self._held.discard if event.phase == "end" else self._held.add)(event.client_id)
         if event.instance_index is None:
             return
         eye = a_place("camera", event.client.camera.position)
         way = a_way("drag", np.asarray(event.end_position) - eye)
-        self._moved(who, event.instance_index, eye, way)
+        self._moved(event.client_id, who, event.instance_index, eye, way)
+
+
+class Drawn:
+    """The path in the making, in the page of whoever makes it."""
+
+    def __init__(self, scene: viser.SceneApi, names: Sequence[str]) -> None:
+        self._scene, self._colours = scene, main_colours(names)
+        self._handles: list[viser.SceneNodeHandle] = []
+        self._shown: tuple[int | None, int] = (None, 0)
+
+    def draw(self, sketch: Sketch) -> None:
+        """Show it as it is now."""
+        shown = (sketch.who, len(sketch.places))
+        if shown == self._shown:
+            return
+        self._shown = shown
+        for handle in self._handles:
+            handle.remove()
+        self._handles = []
+        for path in sketched(sketch):
+            place = np.zeros((len(path.route), 3))
+            place[:, [0, 2]], place[:, 1] = path.route.places, LIFT
+            radius = np.array([p.radius for p in path.route.points])
+            colour = self._colours[path.who]
+            name, (vertices, faces) = f"{STAGE}/sketch", _disc()
+            self._handles.append(
+                self._scene.add_batched_meshes_simple(
+                    f"{name}/discs",
+                    vertices,
+                    faces,
+                    np.tile([1.0, 0.0, 0.0, 0.0], (len(place), 1)),
+                    place,
+                    batched_scales=np.stack([radius, np.ones(len(place)), radius], axis=1),
+                    batched_colors=colour,
+                    opacity=NEXT,
+                    lod="off",
+                    cast_shadow=False,
+                    receive_shadow=False,
+                )
+            )
+            if len(place) > 1:
+                self._handles.append(
+                    self._scene.add_line_segments(
+                        f"{name}/line", _segments(place), np.array(colour), thickness=LINE_WIDTH
+                    )
+                )
 
 
 def _segments(place: np.ndarray) -> np.ndarray:

@@ -32,11 +32,11 @@ class Targets:
         server: viser.ViserServer,
         objects: Sequence[SceneObject],
         moved: Callable[[str, np.ndarray], None],
-        dragged: Callable[[str, np.ndarray, np.ndarray], None] | None = None,
+        dragged: Callable[[int, str, np.ndarray, np.ndarray], None] | None = None,
     ) -> None:
-        """dragged: told of objects that are dragged themselves, with the ray [3], [3] in the page's
-        world that points to their new place. A gizmo, which they have otherwise, takes all clicks
-        on them and round about.
+        """dragged: told which page drags which of the objects that are dragged themselves, with the
+        ray [3], [3] in the page's world that points to the new place. A gizmo, which they have
+        otherwise, takes all clicks on them and round about.
         """
         self._objects = tuple(o.name for o in objects)
         self._shown = [
@@ -47,7 +47,7 @@ class Targets:
         ]
         self._radius = np.array([o.radius for o in objects])  # m, as drawn at scale 1
         self._gizmos: dict[int, viser.TransformControlsHandle] = {}
-        self._held: set[int] = set()
+        self._held: set[tuple[int, int]] = set()  # pages, and what each drags
         self._flash = np.zeros(len(objects))  # s left
         for i, o in enumerate(objects):
             if o.draggable and dragged is None:
@@ -56,12 +56,13 @@ class Targets:
                 self._let_drag(i, o.name, dragged)
 
     def _let_drag(
-        self, index: int, name: str, dragged: Callable[[str, np.ndarray, np.ndarray], None]
+        self, index: int, name: str, dragged: Callable[[int, str, np.ndarray, np.ndarray], None]
     ) -> None:
         def drag(event: viser.SceneNodeDragEvent) -> None:
-            (self._held.discard if event.phase == "end" else self._held.add)(index)
+            page = event.client_id
+            (self._held.discard if event.phase == "end" else self._held.add)((page, index))
             eye = a_place("camera", event.client.camera.position)
-            dragged(name, eye, a_way("drag", np.asarray(event.end_position) - eye))
+            dragged(page, name, eye, a_way("drag", np.asarray(event.end_position) - eye))
 
         self._shown[index].on_drag(safely(drag))
 
@@ -81,19 +82,23 @@ class Targets:
         )
 
         def drag(event: viser.TransformControlsEvent) -> None:
+            held = (-1 if event.client_id is None else event.client_id, index)
             if event.phase == "start":
-                self._held.add(index)
+                self._held.add(held)
             elif event.phase == "end":
-                self._held.discard(index)
+                self._held.discard(held)
             moved(thing.name, np.array(event.target.position, dtype=np.float64))
 
         gizmo.on_update(safely(drag))
         return gizmo
 
-    @property
-    def held(self) -> bool:
-        """Whether somebody is dragging: the ground must not slide away under the pointer."""
-        return bool(self._held)
+    def held(self, page: int) -> bool:
+        """Whether a page drags one: its ground must not slide away under the pointer."""
+        return any(holder == page for holder, _ in self._held)
+
+    def let_go(self, page: int) -> None:
+        """A page has gone, whatever it held."""
+        self._held = {held for held in self._held if held[0] != page}
 
     def strike(self, name: str) -> None:
         """Flash an object that was hit."""
@@ -119,7 +124,7 @@ class Targets:
                 self._flash[i] = max(self._flash[i] - seconds, 0.0)
                 thing.color = mix(TARGET_COLOUR, STRUCK_COLOUR, self._flash[i] / FLASH_SECONDS)
             gizmo = self._gizmos.get(i)
-            if gizmo is not None and i not in self._held:
+            if gizmo is not None and all(i != held for _, held in self._held):
                 gizmo.position = position[i] + (np.asarray(gizmo.position) - position[i]) * left
 
 

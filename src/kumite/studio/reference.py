@@ -12,17 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 import viser
-from scipy.spatial import ConvexHull
 
-from kumite.annotate.balance import centre_of_mass, support
-from kumite.annotate.reference import where_found
 from kumite.body import RGB, BodyMesh, main_colours, mix, skin_vertices
-from kumite.rotation import from_yaw, planar_apply, planar_inverse
-from kumite.scene import PrepareScene
+from kumite.clip import Skeleton
+from kumite.rotation import from_yaw
 from kumite.scene.look import line
-from kumite.scene.opponents import NOBODY
-from kumite.scene.prepare import NO_THING
-from kumite.scene.walkers import NOTHING, ON_THE_WAY
+from kumite.scene.stage import Led, Preparation
 from kumite.studio.ring import STAGE
 
 BODY_COLOUR: RGB = (150, 210, 255)
@@ -44,52 +39,32 @@ class Asked:
     support: bool = False
 
 
-class Posture(NamedTuple):
-    """A reference posture in its facing frame."""
-
-    vertices: np.ndarray  # [V, 3] m
-    hull: np.ndarray  # [n, 2] m, corners of the support area in turn, x and z; none where n is 0
-    centre: np.ndarray  # [2] m, the centre of mass on the ground
-
-
 class PreparedPicture(NamedTuple):
     """What one drawing needs of the stage, copied under the lock."""
 
     goal: np.ndarray | None  # [2] m, x and z
-    target: int  # motion whose reference posture is shown, or NOTHING
+    motion: str | None  # whose reference posture is shown
     begins: np.ndarray  # [3] the facing frame that it is begun at
     asked: Asked
-
-
-class State(NamedTuple):
-    """How far somebody is prepared, and for what."""
-
-    chosen: float  # level
-    shown: float
-    prepares: str | None  # the target motion
-    does: str | None
-    away: float | None  # m to its place
 
 
 @dataclass
 class Prepared:
     """Of one walker at a time: nothing is sent of what is switched off, or has not changed."""
 
-    server: viser.ViserServer
-    scene: PrepareScene
+    nodes: viser.SceneApi
+    walk: Led
+    skeleton: Skeleton
     mesh: BodyMesh
+    names: tuple[str, ...]  # of all on the stage
     asked: Asked = field(default_factory=Asked)
 
     def __post_init__(self) -> None:
-        preparing = self.scene.library.preparing
-        assert preparing is not None
-        self._preparing = preparing
-        self._postures: dict[int, Posture] = {}
-        self._bodies: dict[int, viser.MeshHandle] = {}
-        self._supports: dict[int, viser.FrameHandle] = {}
-        self._frame = self.server.scene.add_frame(f"{STAGE}/prepared", show_axes=False)
+        self._bodies: dict[str, viser.MeshHandle] = {}
+        self._supports: dict[str, viser.FrameHandle] = {}
+        self._frame = self.nodes.add_frame(f"{STAGE}/prepared", show_axes=False)
         part = line(GOAL_RADIUS)
-        self._ring = self.server.scene.add_mesh_simple(
+        self._ring = self.nodes.add_mesh_simple(
             f"{STAGE}/goal",
             part.vertices,
             part.faces,
@@ -100,55 +75,9 @@ class Prepared:
         )
         self._of = -1  # whose colour the ring has
 
-    # What there is to see.
-
-    def _goes(self) -> bool:
-        scene, k = self.scene, self.asked.who
-        led = np.isfinite(scene.told[k, 0])
-        return bool(led or scene.thing[k] != NO_THING or scene.opponents.foe[k] != NOBODY)
-
-    def state(self) -> State:
+    def state(self) -> Preparation:
         """Under the lock: how things stand."""
-        w, k = self.scene.walkers, self.asked.who
-        wants, doing = int(w.wants[k]), int(w.doing[k])
-        label = self.scene.motions
-        return State(
-            float(w.level[k]),
-            float(w.alpha[k]),
-            None if wants == NOTHING else label[wants],
-            None if doing == ON_THE_WAY else label[doing],
-            float(w.off()[0][k]) if self._goes() else None,
-        )
-
-    def about(self, motion: str) -> str:
-        """Which frame the reference posture of a target motion is."""
-        t, p = self.scene.motions.index(motion), self._preparing
-        mark = int(p.hierarchy.targets.mark[t])
-        return where_found(int(p.reference[t]), mark, bool(p.found[t]))
-
-    def posture(self, target: int) -> Posture:
-        """The reference posture of a target motion."""
-        if target not in self._postures:
-            self._postures[target] = self._find(int(self._preparing.reference[target]))
-        return self._postures[target]
-
-    def _find(self, frame: int) -> Posture:
-        library = self.scene.library
-        clips, contacts = library.clips, library.contacts
-        position, world = (x[frame] for x in clips.world)
-        back = planar_inverse(clips.facing[frame])
-        vertices, _ = skin_vertices(self.mesh, clips.skeleton, position, world)
-        ground = contacts.on_ground[frame : frame + 1]
-        corner_at, touches = support(clips.skeleton, position[None], world[None], ground)
-        corners = corner_at[touches]
-        hull = corners[ConvexHull(corners).vertices] if len(corners) > 2 else np.empty((0, 2))
-        centre = centre_of_mass(self.scene.body, position, world)
-        flat = np.insert(hull, 1, 0.0, axis=1)
-        return Posture(
-            planar_apply(back, vertices),
-            planar_apply(back, flat)[:, [0, 2]],
-            planar_apply(back, centre)[[0, 2]],
-        )
+        return self.walk.prepared(self.asked.who)
 
     @cached_property
     def _disc(self) -> tuple[np.ndarray, np.ndarray]:
@@ -159,17 +88,12 @@ class Prepared:
 
     def look(self) -> PreparedPicture:
         """Under the lock: what is asked for, as it is now."""
-        w, asked = self.scene.walkers, self.asked
-        k = asked.who
-        goal, told = w.goal[k].copy(), self.scene.told[k].copy()
-        # At a goal without a heading nothing is begun; who does a motion has begun it.
-        begins = np.isfinite(goal[2]) and w.doing[k] == ON_THE_WAY
-        shows = begins and (asked.posture or asked.support)
+        asked, now = self.asked, self.state()
+        shows = now.begins is not None and (asked.posture or asked.support)
         return PreparedPicture(
-            # Where the hand has just sent it, it goes from the next frame on.
-            (told if np.isfinite(told[0]) else goal[:2]) if asked.goal and self._goes() else None,
-            int(w.wants[k]) if shows else NOTHING,
-            goal,
+            now.goal if asked.goal else None,
+            now.prepares if shows else None,
+            np.zeros(3) if now.begins is None else now.begins,
             Asked(**vars(asked)),
         )
 
@@ -178,13 +102,12 @@ class Prepared:
         if picture.goal is not None:
             if self._of != picture.asked.who:
                 self._of = picture.asked.who
-                self._ring.color = mix(
-                    main_colours(self.scene.names)[self._of], (255, 255, 255), 0.3
-                )
+                colour = main_colours(self.names)[self.walk.led[self._of]]
+                self._ring.color = mix(colour, (255, 255, 255), 0.3)
             self._ring.position = np.insert(picture.goal, 1, 0.0)
         self._switch(self._ring, picture.goal is not None)
-        t = picture.target
-        if t != NOTHING:
+        t = picture.motion
+        if t is not None:
             x, z, yaw = picture.begins
             self._frame.position, self._frame.wxyz = (x, 0.0, z), from_yaw(yaw)
             if picture.asked.posture and t not in self._bodies:
@@ -200,10 +123,12 @@ class Prepared:
         if handle.visible != on:
             handle.visible = on
 
-    def _add_body(self, target: int) -> viser.MeshHandle:
-        return self.server.scene.add_mesh_simple(
-            f"{STAGE}/prepared/body/{target}",
-            self.posture(target).vertices.astype(np.float32),
+    def _add_body(self, motion: str) -> viser.MeshHandle:
+        posture = self.walk.reference(motion)
+        vertices, _ = skin_vertices(self.mesh, self.skeleton, posture.position, posture.wxyz)
+        return self.nodes.add_mesh_simple(
+            f"{STAGE}/prepared/body/{motion}",
+            vertices.astype(np.float32),
             self.mesh.faces,
             color=BODY_COLOUR,
             opacity=OPACITY,
@@ -211,9 +136,9 @@ class Prepared:
             receive_shadow=False,
         )
 
-    def _add_support(self, target: int) -> viser.FrameHandle:
-        name = f"{STAGE}/prepared/support/{target}"
-        posture, scene = self.posture(target), self.server.scene
+    def _add_support(self, motion: str) -> viser.FrameHandle:
+        name = f"{STAGE}/prepared/support/{motion}"
+        posture, scene = self.walk.reference(motion), self.nodes
         frame = scene.add_frame(name, show_axes=False)
         centre = np.insert(posture.centre, 1, 0.0)
         vertices, faces = self._disc

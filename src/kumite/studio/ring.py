@@ -1,7 +1,8 @@
 """The place: floor, light, camera, and the frame that everything on stage stands in.
 
 To follow the fighters the studio moves the stage under the camera, not the camera: the user's
-orbit then never fights with the server over the camera, and all pages follow with one message.
+orbit then never fights with the server over the camera. Each page has a stage's frame of its own,
+in which stands what is shown to all.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ FARTHEST_BEHIND, BEHIND_HEIGHT = 10.0, 2.6  # m from who walks about, and above 
 FOLLOW_HALFLIFE = 0.35  # s for the stage to make up half the way to the fighters' midpoint
 
 
-def build(server: viser.ViserServer) -> viser.FrameHandle:
-    """Floor and light in an empty scene; returns the stage's frame."""
+def build(server: viser.ViserServer) -> None:
+    """Floor and light in an empty scene."""
     scene = server.scene
     scene.set_up_direction("+y")
     scene.world_axes.visible = False
@@ -42,7 +43,7 @@ def build(server: viser.ViserServer) -> viser.FrameHandle:
     scene.add_light_hemisphere(
         "/light/sky", sky_color=(235, 240, 255), ground_color=(92, 84, 78), intensity=1.5
     )
-    frame = scene.add_frame(STAGE, show_axes=False)
+    scene.add_frame(STAGE, show_axes=False)
     scene.add_grid(
         f"{STAGE}/floor",
         width=120.0,
@@ -60,7 +61,6 @@ def build(server: viser.ViserServer) -> viser.FrameHandle:
         fade_distance=32.0,
         fade_strength=1.4,
     )
-    return frame
 
 
 def aim(server: viser.ViserServer, points: np.ndarray, centre: np.ndarray) -> None:

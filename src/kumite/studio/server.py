@@ -11,6 +11,7 @@ import contextlib
 import ipaddress
 import logging
 import socket
+import warnings
 from collections.abc import Iterator, Sequence
 
 import rich
@@ -20,6 +21,8 @@ from kumite.errors import KumiteError
 from kumite.studio.gate import Gate, guarding
 
 PORTS_TRIED = 100
+# A page may go between two messages to it; viser drops what comes after, and need not say so.
+warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
 
 
 class LocalServer(viser.ViserServer):

@@ -13,32 +13,26 @@ import threading
 import time
 import webbrowser
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import viser
 
 from kumite.body import body_mesh
 from kumite.clip import forward_kinematics
 from kumite.errors import KumiteError
-from kumite.scene.actions import ActionPlayback
-from kumite.scene.dodge import DodgeScene
 from kumite.scene.events import Hit, Struck
-from kumite.scene.prepare import PrepareScene
-from kumite.scene.stage import Playback, Stage, in_sight
-from kumite.scene.world import World
-from kumite.studio import bodies, props, ring
+from kumite.scene.stage import SceneObject, Stage, in_sight, offers_of
+from kumite.studio import bodies, panel, props, ring
 from kumite.studio.coming import Coming
 from kumite.studio.doors import a_place, a_seed, within
-from kumite.studio.leading import Leader
 from kumite.studio.pace import Pace
-from kumite.studio.panel import FASTEST, SLOWEST, Control, Panel
-from kumite.studio.paths import Path, Paths, Sketch, on_floor, sketched
-from kumite.studio.reference import Prepared, PreparedPicture
+from kumite.studio.panel import FASTEST, SLOWEST
+from kumite.studio.paths import Path, Paths, on_floor
 from kumite.studio.server import close_server, is_loopback, open_server, url_of
-from kumite.studio.throwing import Throws
-from kumite.studio.volumes import VolumePicture, Volumes
-from kumite.studio.wording import EventLog, is_dodging, is_preparing, struck
+from kumite.studio.viewer import Looks, Viewer
+from kumite.studio.wording import EventLog, struck
 
 MOST_DRAWN = 60.0  # pictures a second
 PANEL_PERIOD = 0.2  # s between updates of what is read, not watched
@@ -58,8 +52,8 @@ class _Picture:
     hits: list[Hit | Struck] = field(default_factory=list)
     note: str = ""  # behind the time
     paths: list[Path] = field(default_factory=list)  # of whom is sent along check points
-    volumes: VolumePicture | None = None
-    prepared: PreparedPicture | None = None
+    spheres: tuple[np.ndarray, np.ndarray] | None = None  # of whom balls may be thrown at
+    looks: dict[int, Looks] = field(default_factory=dict)  # of each page
 
 
 class Studio:
@@ -104,7 +98,9 @@ class Studio:
         self._ended = False
         self._hits: list[Hit | Struck] = []
         self._pace = Pace(stage.fps)
-        self._log = EventLog(stage.names, dodging=is_dodging(stage), preparing=is_preparing(stage))
+        self._offers = offers_of(stage)
+        self._log = EventLog(stage.names, self._offers.counts)
+        self.viewers: dict[int, Viewer] = {}  # by their pages
 
     def show(self, stage: Stage) -> None:
         """Show another stage in the same page, from now on. The thread that runs.
@@ -113,7 +109,12 @@ class Studio:
         """
         mesh, server = body_mesh(stage.skeleton), self.server
         with self._lock, server.atomic():
-            server.scene.remove_click_callback("all")
+            for viewer in self.viewers.values():
+                if viewer.client is not None:
+                    with viewer.client.atomic():
+                        viewer.client.scene.remove_click_callback("all")
+                        viewer.client.scene.reset()
+                        viewer.client.gui.reset()
             server.scene.reset()
             server.gui.reset()
             self._take(stage)
@@ -121,54 +122,51 @@ class Studio:
         server.flush()
 
     def _build(self, mesh: bodies.BodyMesh) -> None:
-        stage, server = self.stage, self.server
-        self._follow = ring.Follow(ring.build(server))
+        stage, server, offers = self.stage, self.server, self._offers
+        self._mesh = mesh
+        ring.build(server)
+        panel.prepare(server.gui, stage.title)
         unarmed = getattr(stage, "unarmed", ())
-        recorded = stage if isinstance(stage, Playback) else None
-        self._pose = forward_kinematics if recorded is None else bodies.pose_uncompiled
+        self._pose = forward_kinematics if offers.played is None else bodies.pose_uncompiled
         self._bodies = bodies.show_bodies(server, stage.skeleton, mesh, stage.names, unarmed)
-        self._walk = stage if isinstance(stage, PrepareScene) else None
-        dragged = None if self._walk is None else self._drag_object
+        dragged = None if offers.led is None else self._drag_object
         self._targets = props.Targets(server, stage.objects, self.move_object, dragged)
         self._bursts = props.Bursts(server)
-        self._fight = stage if isinstance(stage, World) and stage.fight is not None else None
         self._targeted = np.array([not o.thrown for o in stage.objects], dtype=bool)
-        dodge = stage if isinstance(stage, DodgeScene) else None
-        self._throws = None if dodge is None else Throws(dodge)
-        self._volumes = None if dodge is None else Volumes(server, dodge)
-        self._prepared = None if self._walk is None else Prepared(server, self._walk, mesh)
-        self._sketch = Sketch()
         self._paths = Paths(server, stage.names, self._move_check_point)
-        self._panel = Panel(
-            server,
-            self,
-            title=stage.title,
-            seed=stage.seed,
-            frames=None if recorded is None else len(recorded.recording),
-            fps=stage.fps,
-            controls=[c for c in getattr(stage, "controls", ()) if isinstance(c, Control)],
-            actions=stage if isinstance(stage, ActionPlayback) else None,
-            fight=self._fight,
-            sketch=self._sketch,
-            throws=self._throws,
-            volumes=self._volumes,
-            leader=None if self._walk is None else Leader(self._walk),
-            prepared=self._prepared,
-            coming=self._coming,
-        )
         picture = self._look()
-        self._follow.jump(self._midpoint(picture))
-        if dodge is not None:
-            before = float(dodge.cast.facing[0, 2])
-            ring.aim_at(server, picture.root_position, before, self._follow.centre)
-        elif self._walk is not None:
-            yaw = float(self._walk.walkers.facing[0, 2])
-            ring.aim_behind(server, self._in_view(picture), yaw, self._follow.centre)
+        centre = self._midpoint(picture)
+        if offers.seen == "before":
+            ring.aim_at(server, picture.root_position, offers.yaw, centre)
+        elif offers.seen == "behind":
+            ring.aim_behind(server, self._in_view(picture), offers.yaw, centre)
         else:
-            ring.aim(server, self._in_view(picture), self._follow.centre)
+            ring.aim(server, self._in_view(picture), centre)
         self._drawn_at = self._panel_at = time.perf_counter()
         with server.atomic():
             self._draw(picture, 0.0)
+
+    def look_in(self, page: viser.ClientHandle | viser.ViserServer) -> Viewer:
+        """Show the stage in another page, with a panel of its own; in tests in none, the server.
+        The thread that runs."""
+        with self._lock:
+            centre = self._midpoint(self._look())
+            viewer = Viewer(page, self, self.stage, self._offers, self._mesh, centre, self._coming)
+            self.viewers[viewer.id] = viewer
+            self._redraw = True
+        return viewer
+
+    def _welcome(self) -> None:
+        """Pages that have come get what belongs to them; of those that have gone nothing stays."""
+        clients = self.server.get_clients()
+        for page in [n for n, v in self.viewers.items() if v.client and n not in clients]:
+            del self.viewers[page]
+            self._targets.let_go(page)
+            self._paths.let_go(page)
+        for number, client in clients.items():
+            if number not in self.viewers:
+                with client.atomic():
+                    self.look_in(client)
 
     # What the page asks for; any thread.
 
@@ -212,17 +210,19 @@ class Studio:
     def seek(self, frame: int) -> None:
         """Jump to a frame; a live stage cannot."""
         with self._lock:
-            if isinstance(self.stage, Playback):
-                self.stage.seek(frame)
+            if self._offers.played is not None:
+                self._offers.played.seek(frame)
                 self._after_jump()
         self.wake()
 
     def choose(self, action: int) -> None:
         """Play an action of a library over and over; other stages have none."""
         with self._lock:
-            if isinstance(self.stage, ActionPlayback):
-                self.stage.choose(action)
-                self._panel.set_length(len(self.stage.recording))
+            listed = self._offers.listed
+            if listed is not None:
+                listed.choose(action)
+                for viewer in self.viewers.values():
+                    viewer.panel.set_length(len(listed.recording))
                 self._after_jump()
                 self._playing = self._rewound = True
         self.wake()
@@ -234,28 +234,16 @@ class Studio:
         self._log.update(self.stage.events, self.stage.frame)
         self._pace.restart()
 
+    @property
+    def speed(self) -> float:
+        """Seconds of the scene in a second of wall time."""
+        return self._pace.speed
+
     def set_speed(self, speed: float) -> None:
         """Seconds of the scene in a second of wall time, 0.1 to 4."""
         with self._lock:
             self._pace.speed = within("speed", speed, SLOWEST, FASTEST)
         self._wake.set()
-
-    def set_follow(self, on: bool) -> None:
-        """Keep the fighters' midpoint in the middle of the picture, or not."""
-        self._follow.on = on
-        self.wake()
-
-    def show_decisions(self, on: bool) -> None:
-        """List decisions among the events."""
-        with self._lock:
-            self._log.show_quiet = on
-        self.wake()
-
-    def tune(self, control: Control, value: float) -> None:
-        """Set one of the stage's controls."""
-        value = within(control.name, value, control.minimum, control.maximum)
-        with self._lock:
-            control.set(value)
 
     def direct(self, act: Callable[[], Any]) -> Any:
         """Do something to the stage between two frames, and show it."""
@@ -264,16 +252,19 @@ class Studio:
         self.wake()
         return found
 
-    def _move_check_point(self, who: int, index: int, eye: np.ndarray, way: np.ndarray) -> None:
-        """Put a check point where a ray of the page meets the floor."""
-        place, fight = on_floor(self.from_page(eye), way), self._fight
-        if place is not None and fight is not None and self._sketch.who != who:
+    def _move_check_point(
+        self, page: int, who: int, index: int, eye: np.ndarray, way: np.ndarray
+    ) -> None:
+        """Put a check point where a ray of a page meets the floor."""
+        place, directed = on_floor(self.viewers[page].on_stage(eye), way), self._offers.directed
+        if place is not None and directed is not None:
+            name = self.stage.names[who]
             with contextlib.suppress(KumiteError):  # its path may have been cleared meanwhile
-                self.direct(lambda: fight.move_check_point(fight.names[who], index, place))
+                self.direct(lambda: directed.move_check_point(name, index, place))
 
-    def _drag_object(self, name: str, eye: np.ndarray, way: np.ndarray) -> None:
-        """Put an object where a ray of the page meets the level that it is at."""
-        eye = self.from_page(eye)
+    def _drag_object(self, page: int, name: str, eye: np.ndarray, way: np.ndarray) -> None:
+        """Put an object where a ray of a page meets the level that it is at."""
+        eye = self.viewers[page].on_stage(eye)
         level = next(o.position[1] for o in self.stage.objects if o.name == name)
         place = on_floor(eye - [0.0, level, 0.0], way)
         if place is not None:
@@ -297,16 +288,6 @@ class Studio:
         close_server(self.server)
 
     # The loop; one thread.
-
-    def seen_at(self, point: np.ndarray) -> np.ndarray:
-        """Where a point [3] m of the stage lies in the page's world, which follows the fighters."""
-        x, z = self._follow.centre
-        return np.asarray(point, dtype=np.float64) - np.array([x, 0.0, z])
-
-    def from_page(self, point: np.ndarray) -> np.ndarray:
-        """Where a point [3] m of the page's world lies on the stage."""
-        x, z = self._follow.centre
-        return np.asarray(point, dtype=np.float64) + np.array([x, 0.0, z])
 
     def run(self, seconds: float | None = None) -> None:
         """Play until :meth:`stop`, or for ``seconds`` of wall time; they count from when what is
@@ -335,7 +316,8 @@ class Studio:
         if coming.error is not None:
             raise coming.error
         if coming.stage is None:
-            self._redraw |= self._panel.look_out()
+            for viewer in self.viewers.values():
+                self._redraw |= viewer.panel.look_out()
             return
         self._coming = None
         self.show(coming.stage)
@@ -353,9 +335,10 @@ class Studio:
 
     def _tick(self) -> bool:
         """Step what is due and draw it; True while something fades or slides on its own."""
+        self._welcome()
         with self._lock:
-            if self._throws is not None:
-                self._throws.throw()
+            for viewer in self.viewers.values():
+                viewer.act()
             if self._playing and (due := self._pace.take()):
                 self._step(due)
             now = time.perf_counter()
@@ -364,22 +347,22 @@ class Studio:
                 return False
             if seconds < 1 / MOST_DRAWN:
                 return True
-            if not self.server.get_clients():
+            if not self.viewers:
                 self._hits.clear()
                 return False  # _redraw stays set: whoever comes is shown the latest
             self._redraw, rewound, self._rewound = False, self._rewound, False
             picture = self._look()
         with self.server.atomic():
             if rewound:
-                self._follow.jump(self._midpoint(picture))
                 self._bursts.clear()
-            self._draw(picture, min(seconds, LONGEST_TICK))
+            self._draw(picture, min(seconds, LONGEST_TICK), rewound=rewound)
         self.server.flush()
         self._drawn_at = now
         return self._animating
 
     def _look(self) -> _Picture:
         stage = self.stage
+        throwing, listed = self._offers.throwing, self._offers.listed
         hits, self._hits = self._hits, []
         return _Picture(
             stage.frame,
@@ -388,44 +371,70 @@ class Studio:
             np.array([o.position for o in stage.objects], dtype=np.float64).reshape(-1, 3),
             np.array([o.radius for o in stage.objects], dtype=np.float64),
             hits,
-            f" · frame {stage.clip_frame} of its clip" if isinstance(stage, ActionPlayback) else "",
+            "" if listed is None else f" · frame {listed.clip_frame} of its clip",
             self._routes(),
-            None if self._volumes is None else self._volumes.look(),
-            None if self._prepared is None else self._prepared.look(),
+            None if throwing is None else throwing.bodies(),
+            {page: viewer.look() for page, viewer in self.viewers.items()},
         )
 
     def _routes(self) -> list[Path]:
-        """Every fighter's check points; a path in the making stands for its fighter's."""
-        if self._fight is None:
-            return []
-        return [
-            Path(k, p.route, p.index)
-            for k, p in enumerate(self._fight.progress)
-            if p is not None and k != self._sketch.who
-        ] + sketched(self._sketch)
+        """Every fighter's check points."""
+        directed = self._offers.directed
+        progress = () if directed is None else directed.progress
+        return [Path(k, p.route, p.index) for k, p in enumerate(progress) if p is not None]
 
-    def _draw(self, picture: _Picture, seconds: float) -> None:
+    def _draw(self, picture: _Picture, seconds: float, *, rewound: bool = False) -> None:
         position, world = self._pose(self.stage.skeleton, picture.root_position, picture.wxyz)
         for hit in picture.hits:
             self._show_hit(hit)
-        if not (self._targets.held or self._paths.held or self._sketch.who is not None):
-            self._follow.update(self._midpoint(picture), seconds)
         self._bodies.draw(position, world, seconds)
         self._targets.draw(picture.objects, picture.radii, seconds)
-        if self._volumes is not None and picture.volumes is not None:
-            self._volumes.draw(picture.volumes)
-        if self._prepared is not None and picture.prepared is not None:
-            self._prepared.draw(picture.prepared)
         self._paths.draw(picture.paths)
         self._animating = self._bursts.draw(seconds)
         now = time.perf_counter()
-        if now - self._panel_at >= PANEL_PERIOD or seconds == 0.0 or not self._playing:
+        read = now - self._panel_at >= PANEL_PERIOD or seconds == 0.0 or not self._playing
+        if read:
             self._panel_at = now
-            note = " · ended" if self._ended else "" if self._playing else " · paused"
-            note = picture.note + note
-            self._panel.playing(self._playing)
-            with self._lock:
-                self._panel.show(self._log, picture.frame, note)
+        middle = self._midpoint(picture)
+        objects = [
+            replace(o, position=at) for o, at in zip(self.stage.objects, picture.objects.copy())
+        ]
+        for page, looks in picture.looks.items():
+            self._draw_for(self.viewers[page], looks, picture, middle, objects, seconds, rewound)
+            if read:
+                self._show_panel(self.viewers[page], picture)
+
+    def _draw_for(
+        self,
+        viewer: Viewer,
+        looks: Looks,
+        picture: _Picture,
+        middle: np.ndarray,
+        objects: list[SceneObject],
+        seconds: float,
+        rewound: bool,
+    ) -> None:
+        """What of a picture is for one page only."""
+        holds = self._targets.held(viewer.id) or self._paths.held(viewer.id)
+        with contextlib.nullcontext() if viewer.client is None else viewer.client.atomic():
+            viewer.draw(
+                looks,
+                middle,
+                seconds,
+                objects,
+                picture.spheres,
+                now=time.perf_counter(),
+                jump=rewound,
+                holds=holds,
+            )
+        if viewer.client is not None:
+            viewer.client.flush()
+
+    def _show_panel(self, viewer: Viewer, picture: _Picture) -> None:
+        note = " · ended" if self._ended else "" if self._playing else " · paused"
+        with self._lock:
+            viewer.panel.playing(self._playing, self.speed, self.stage.seed)
+            viewer.panel.show(self._log, picture.frame, picture.note + note)
 
     def _in_view(self, picture: _Picture) -> np.ndarray:
         """Points [N, 3] m that belong in the picture."""
@@ -435,8 +444,8 @@ class Studio:
     def _midpoint(self, picture: _Picture) -> np.ndarray:
         """The middle [2] (x, z) of what goes on: of the fighters, or of one and the target; of who
         walks about."""
-        if self._walk is not None:
-            return picture.root_position[: self._walk.users, [0, 2]].mean(axis=0)
+        if self._offers.seen == "behind" and self._offers.led is not None:
+            return picture.root_position[list(self._offers.led.led)][:, [0, 2]].mean(axis=0)
         points = picture.root_position
         points = points if len(points) > 1 else self._in_view(picture)
         return points[:, [0, 2]].mean(axis=0)

@@ -1,21 +1,20 @@
 """Throwing by hand: a click into the picture throws a ball from the viewer's eye.
 
 A ball goes for the body that the clicked ray comes near to, at the point of the ray that is nearest
-to it; if the ray passes everybody, for the ray's point as far away as they are. Clicks come from
-the page's threads and are queued; the thread that steps the scene throws.
+to it; if the ray passes everybody, for the ray's point as far away as they are. Bodies are where
+they were in the picture that was clicked.
 """
 
 from __future__ import annotations
 
 import contextlib
-from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from kumite.errors import KumiteError
-from kumite.scene import DodgeScene
+from kumite.scene.stage import Throwable
 from kumite.studio.doors import within
 
 SLOWEST, FASTEST = 4.0, 40.0  # m/s
@@ -24,7 +23,6 @@ SPEED = 9.0  # m/s, at first
 NEAR = 1.0  # m from a body to a ray that means it
 BEFORE, BELOW = 0.5, 0.25  # m before and below the eye that a ball leaves the hand
 LONGEST_FLIGHT = 2.5  # s: what would be under way for longer is thrown faster
-MOST_WAITING = 32  # clicks
 
 
 class Aim(NamedTuple):
@@ -71,17 +69,14 @@ def _passing(eye: np.ndarray, way: np.ndarray, middle: np.ndarray) -> tuple[int,
 
 @dataclass
 class Throws:
-    """What is thrown by hand, how, and the clicks that wait for it."""
+    """What a page throws by hand, and how."""
 
-    scene: DodgeScene
+    at: Throwable
     speed: float = SPEED  # m/s
     radius: float = 0.11  # m; the scene's at first
-    waiting: deque[tuple[np.ndarray, np.ndarray] | None] = field(
-        default_factory=lambda: deque(maxlen=MOST_WAITING)
-    )
 
     def __post_init__(self) -> None:
-        self.radius = float(np.clip(self.scene.balls_settings.radius, SMALLEST, LARGEST))
+        self.radius = float(np.clip(self.at.ball_radius, SMALLEST, LARGEST))
 
     def set_speed(self, speed: float) -> None:
         self.speed = within("ball speed", speed, SLOWEST, FASTEST)
@@ -89,30 +84,22 @@ class Throws:
     def set_radius(self, radius: float) -> None:
         self.radius = within("ball radius", radius, SMALLEST, LARGEST)
 
-    def click(self, eye: np.ndarray, way: np.ndarray) -> None:
-        """A ray [3], [3] on the stage was clicked. Any thread."""
-        self.waiting.append((eye, way))
-
     def one(self) -> None:
-        """A ball is to come as by itself. Any thread."""
-        self.waiting.append(None)
+        """A ball comes as by itself. The scene stands still."""
+        self.at.throw_one(self.speed, self.radius)
 
-    def throw(self) -> None:
-        """Throw what waits. The thread that steps."""
-        while self.waiting:
-            ray = self.waiting.popleft()
-            with contextlib.suppress(KumiteError):  # a throw that makes no sense is none
-                if ray is None:
-                    self.scene.throw_one(self.speed, self.radius)
-                else:
-                    self._throw_along(*ray)
-
-    def _throw_along(self, eye: np.ndarray, way: np.ndarray) -> None:
-        scene, cast = self.scene, self.scene.cast
-        spheres = scene.search.spheres
-        centre = spheres.at(cast.position, cast.world_wxyz)
-        aim = aim_along(eye, way, centre, spheres.radius, self.radius)
+    def along(
+        self,
+        eye: np.ndarray,
+        way: np.ndarray,
+        bodies: tuple[np.ndarray, np.ndarray] | None = None,
+    ) -> None:
+        """Throw along a ray [3], [3]. bodies: where whom it may mean were seen, as
+        :meth:`Throwable.bodies`. The scene stands still. A throw that makes no sense is none."""
+        centre, radius = self.at.bodies() if bodies is None else bodies
+        aim = aim_along(eye, way, centre, radius, self.radius)
         place = eye + BEFORE * way / np.linalg.norm(way) - [0.0, BELOW, 0.0]
         place[1] = max(place[1], self.radius)
         speed = max(self.speed, float(np.linalg.norm(aim.goal - place)) / LONGEST_FLIGHT)
-        scene.throw(place, aim.goal, speed, aim.who, self.radius)
+        with contextlib.suppress(KumiteError):
+            self.at.throw(place, aim.goal, speed, self.at.thrown_at[aim.who], self.radius)

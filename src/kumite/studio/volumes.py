@@ -11,8 +11,8 @@ import viser
 from kumite.body import RGB
 from kumite.control.attack import Attack
 from kumite.control.avoidance import Plan
-from kumite.scene import DodgeScene
-from kumite.scene.volumes import Volume, attack_volume, attacks_on, avoidance_volume, body_volume
+from kumite.scene.stage import Avoiding
+from kumite.scene.volumes import Volume, attack_volume
 from kumite.studio.ring import STAGE
 
 BODY_COLOUR: RGB = (110, 190, 255)
@@ -46,8 +46,8 @@ class VolumePicture(NamedTuple):
 class Volumes:
     """Spheres on the stage. Nothing is sent of what is switched off, or has not changed."""
 
-    server: viser.ViserServer
-    scene: DodgeScene
+    nodes: viser.SceneApi
+    avoiding: Avoiding
     shown: Shown = field(default_factory=Shown)
 
     def __post_init__(self) -> None:
@@ -59,18 +59,15 @@ class Volumes:
 
     def look(self) -> VolumePicture:
         """Under the lock: what is asked for, as it is now."""
-        shown, side = self.shown, self.scene.side
-        k = shown.who
-        avoider = side.avoiders[k]
-        plan = avoider.plan if shown.left else None
-        new = plan is not None and plan is not self._plan
+        shown, of, k = self.shown, self.avoiding, self.shown.who
+        if k not in of.avoiding:
+            return VolumePicture(None, {}, None, None)
+        plan = of.plan(k) if shown.left else None
         return VolumePicture(
-            body_volume(side.cast, k, side.search.spheres) if shown.body else None,
-            dict(sorted(attacks_on(side.avoiders).items())[-MOST_ATTACKS:])
-            if shown.attacks
-            else {},
+            of.body(k) if shown.body else None,
+            dict(sorted(of.attacks().items())[-MOST_ATTACKS:]) if shown.attacks else {},
             plan,
-            avoidance_volume(side.cast, k, avoider) if new else None,
+            of.left(k) if plan is not None and plan is not self._plan else None,
         )
 
     def draw(self, picture: VolumePicture) -> None:
@@ -105,7 +102,7 @@ class Volumes:
     def _add(self, name: str, volume: Volume, colour: RGB) -> viser.BatchedMeshHandle:
         vertices, faces = self._mesh
         count = len(volume.radius)
-        return self.server.scene.add_batched_meshes_simple(
+        return self.nodes.add_batched_meshes_simple(
             f"{STAGE}/volume/{name}",
             vertices,
             faces,

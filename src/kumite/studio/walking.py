@@ -6,12 +6,14 @@ import html
 from collections.abc import Callable
 from typing import Any, cast
 
+import numpy as np
 import viser
 
-from kumite.studio.dodging import Thrower
+from kumite.scene.stage import Preparation
 from kumite.studio.doors import Safely, a_place, a_way
 from kumite.studio.leading import DOWN, LEFT, RIGHT, UP, Leader
-from kumite.studio.reference import Prepared, State
+from kumite.studio.reference import Prepared
+from kumite.studio.sliders import Director
 
 DIGITS = "123456789"  # hot keys of target motions
 BY_ITSELF = "B"
@@ -38,35 +40,35 @@ class Walking:
 
     def __init__(
         self,
-        server: viser.ViserServer,
+        gui: viser.GuiApi,
         leader: Leader,
         prepared: Prepared,
-        studio: Thrower,
+        director: Director,
         safely: Safely,
+        eye: Callable[[Any], np.ndarray],
     ) -> None:
-        self._leader, self._prepared, self._studio = leader, prepared, studio
-        scene, gui = leader.scene, server.gui
-        with gui.add_folder("Walk"):
+        """eye: where the camera [3] of an event's page is on the stage."""
+        self._leader, self._prepared, self._director = leader, prepared, director
+        self._eye, walk = eye, leader.walk
+        self._walk = gui.add_folder("Walk")
+        with self._walk:
             gui.add_html(
                 '<div style="padding:0 1em .5em;font-size:.85em;opacity:.75">click on the floor or '
                 f"on a thing; arrow keys or I J K L{KEYS_ARE_OURS}</div>"
             )
-            if scene.users > 1:
-                names = scene.names[: scene.users]
-                who = gui.add_dropdown("Walker", names, hint="who is led, and shown below")
-                who.on_update(safely(lambda e: self._choose(names.index(e.target.value))))
             ways = gui.add_button_group("", tuple(KEYS), hint="a few steps, as seen from here")
             ways.on_click(safely(lambda e: self._press(e, e.target.value)))
-            keyed = {_keyed(n, m): m for n, m in enumerate(scene.motions)}
+            keyed = {_keyed(n, m): m for n, m in enumerate(walk.motions)}
             motions = gui.add_button_group("Do", tuple(keyed), hint="and hot keys 1 to 9")
             motions.on_click(safely(lambda e: self._do(e, keyed[e.target.value])))
             self._automatic = gui.add_checkbox(
                 "By itself",
-                scene.automatic,
+                walk.automatic,
                 hint="goes, and begins its motions, without you; where you send it, it goes first",
             )
             self._automatic.on_update(safely(self._set_automatic))
-        with gui.add_folder("Preparation"):
+        self._preparation = gui.add_folder("Preparation")
+        with self._preparation:
             self._text = gui.add_html("")
             for field, label, hint in (
                 ("goal", "Goal", "where it goes"),
@@ -78,7 +80,6 @@ class Walking:
                     safely(lambda e, field=field: self._ask(**{field: e.target.value}))
                 )
         self._add_keys(gui, safely)
-        server.scene.on_click()(safely(self._click))
 
     def _add_keys(self, gui: viser.GuiApi, safely: Safely) -> None:
         def command(label: str, key: str, act: Callable[[Any], None]) -> None:
@@ -87,34 +88,38 @@ class Walking:
         for way, keys in KEYS.items():
             for key in keys:
                 command(f"Walk {WORDS[way]} ({key})", key, lambda e, way=way: self._press(e, way))
-        for digit, motion in zip(DIGITS, self._leader.scene.motions):
+        for digit, motion in zip(DIGITS, self._leader.walk.motions):
             command(_words(motion), digit, lambda e, motion=motion: self._do(e, motion))
         command("By itself or by hand", BY_ITSELF, lambda _: self._turn_automatic())
 
-    def _choose(self, who: int) -> None:
-        self._leader.who = self._prepared.asked.who = who
-        self._studio.wake()
+    def choose(self, who: int) -> None:
+        """Lead another character."""
+        led = self._leader.walk.led
+        self._walk.visible = self._preparation.visible = who in led
+        if who in led:
+
+            def lead() -> None:
+                self._leader.who = self._prepared.asked.who = led.index(who)
+
+            self._director.direct(lead)
 
     def _ask(self, **switches: bool) -> None:
-        for name, value in switches.items():
-            setattr(self._prepared.asked, name, value)
-        self._studio.wake()
+        def ask() -> None:
+            for name, value in switches.items():
+                setattr(self._prepared.asked, name, value)
 
-    def _click(self, event: viser.SceneClickEvent) -> None:
-        eye = self._studio.from_page(a_place("click", event.ray_origin))
-        way = a_way("click", event.ray_direction)
-        self._studio.direct(lambda: self._leader.point(eye, way))
+        self._director.direct(ask)
 
     def _press(self, event: Any, way: str) -> None:
         if event.client is None:
             return
-        camera = event.client.camera
-        eye, at = (a_place("camera", x) for x in (camera.position, camera.look_at))
+        camera, eye = event.client.camera, self._eye(event)
+        at = eye + a_place("camera", camera.look_at) - a_place("camera", camera.position)
         up = a_way("camera", camera.up_direction)
-        self._studio.direct(lambda: self._leader.press(eye, at, up, way))
+        self._director.direct(lambda: self._leader.press(eye, at, up, way))
 
     def _do(self, event: Any, motion: str) -> None:
-        busy = self._studio.direct(lambda: self._leader.trigger(motion))
+        busy = self._director.direct(lambda: self._leader.trigger(motion))
         if busy is not None and event.client is not None:
             said = f"{self._leader.name} does {_words(busy)}; then it can be told to do another"
             event.client.add_notification("Busy", said, auto_close_seconds=2.0)
@@ -122,21 +127,21 @@ class Walking:
     def _set_automatic(self, event: Any) -> None:
         if event.client is not None:  # the panel switches it, too
             value = bool(event.target.value)
-            self._studio.direct(lambda: setattr(self._leader.scene, "automatic", value))
+            self._director.direct(lambda: setattr(self._leader.walk, "automatic", value))
 
     def _turn_automatic(self) -> None:
-        scene = self._leader.scene
-        self._studio.direct(lambda: setattr(scene, "automatic", not scene.automatic))
+        walk = self._leader.walk
+        self._director.direct(lambda: setattr(walk, "automatic", not walk.automatic))
 
     def show(self) -> None:
         """Under the lock: how far it is prepared, and for what."""
-        if self._automatic.value != self._leader.scene.automatic:
-            self._automatic.value = self._leader.scene.automatic
+        if self._automatic.value != self._leader.walk.automatic:
+            self._automatic.value = self._leader.walk.automatic
         content = self._state_html(self._prepared.state())
         if self._text.content != content:
             self._text.content = content
 
-    def _state_html(self, state: State) -> str:
+    def _state_html(self, state: Preparation) -> str:
         hand = " (sent by you)" if self._leader.led else ""
         if state.does is not None:
             said = f"{self._leader.name} does {_words(state.does)}"
@@ -146,7 +151,8 @@ class Walking:
             said = f"{self._leader.name} stays"
         what = "nothing"
         if state.prepares is not None:
-            what = f"{_words(state.prepares)}: {self._prepared.about(state.prepares)}"
+            about = self._leader.walk.reference(state.prepares).about
+            what = f"{_words(state.prepares)}: {about}"
         lines = "".join(f"<div>{html.escape(x)}</div>" for x in (said, f"prepares for {what}"))
         bars = _bar("level", state.shown) + _bar("chosen", state.chosen)
         return f'<div style="padding:0 1em .5em;font-size:.85em">{lines}{bars}</div>'

@@ -7,7 +7,6 @@ from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 
 from kumite.body import main_colours, mix
-from kumite.scene.dodge import DodgeScene
 from kumite.scene.events import (
     Avoided,
     Decision,
@@ -26,8 +25,6 @@ from kumite.scene.events import (
     Throw,
     Touched,
 )
-from kumite.scene.prepare import PrepareScene
-from kumite.scene.stage import Playback, Stage
 from kumite.scene.wording import describe
 
 LINES = 12  # events on the panel
@@ -57,34 +54,17 @@ def struck(event: Hit | Struck) -> str:
     return event.character if isinstance(event, Struck) else event.victim
 
 
-def is_preparing(stage: Stage) -> bool:
-    """Whether those on a stage prepare for what they do: in a recording, whether one did."""
-    if isinstance(stage, Playback):
-        return any(isinstance(e, Launch) for e in stage.recording.events)
-    return isinstance(stage, PrepareScene)
-
-
-def is_dodging(stage: Stage) -> bool:
-    """Whether balls are thrown at those on a stage: in a recording, whether one was."""
-    if isinstance(stage, Playback):
-        return any(isinstance(e, Throw) for e in stage.recording.events)
-    return isinstance(stage, DodgeScene)
-
-
 class EventLog:
-    """The stage's events as the panel shows them: new ones once, scores, the last few lines.
+    """The stage's events as a panel shows them: new ones once, scores, the last few lines.
 
-    dodging: what counts is how many balls were thrown at whom, and how many struck. preparing: how
-    many motions were done, what they hit and what was touched.
+    counts: what a score is kept of: blows thrown and landed, balls thrown at each and whether they
+    struck, errands done and what was touched.
     """
 
-    def __init__(
-        self, names: Sequence[str], *, dodging: bool = False, preparing: bool = False
-    ) -> None:
-        self.names, self.dodging, self.preparing = tuple(names), dodging, preparing
+    def __init__(self, names: Sequence[str], counts: Sequence[str] = ("blows",)) -> None:
+        self.names, self.counts = tuple(names), tuple(counts)
         light = [mix(colour, (255, 255, 255), 0.35) for colour in main_colours(self.names)]
         self.colours = {n: "#{:02x}{:02x}{:02x}".format(*c) for n, c in zip(self.names, light)}
-        self.show_quiet = False
         self.rewind()
 
     def rewind(self) -> None:
@@ -93,6 +73,7 @@ class EventLog:
         self._frame = -1
         self._loud: deque[Event] = deque(maxlen=LINES)
         self._all: deque[Event] = deque(maxlen=LINES)
+        self.strikes = dict.fromkeys(self.names, 0)
         self.thrown = dict.fromkeys(self.names, 0)
         self.landed = dict.fromkeys(self.names, 0)
         self.avoided = dict.fromkeys(self.names, 0)
@@ -120,7 +101,9 @@ class EventLog:
 
     def _count(self, event: Event) -> None:
         match event:
-            case Strike() | Throw():
+            case Strike():
+                counts = self.strikes
+            case Throw():
                 counts = self.thrown
             case Hit(blocked=False):
                 counts = self.landed
@@ -136,28 +119,35 @@ class EventLog:
                 return
         counts[event.character] += 1
 
+    def lines(self, quiet: bool = False) -> list[Event]:
+        """The last events to show, newest first. quiet: decisions, too."""
+        return list(self._all if quiet else self._loud)[::-1]
+
     @property
-    def lines(self) -> list[Event]:
-        """The last events to show, newest first."""
-        return list(self._all if self.show_quiet else self._loud)[::-1]
+    def columns(self) -> dict[str, dict[str, int]]:
+        """What is counted of each, in order."""
+        out: dict[str, dict[str, int]] = {}
+        if "blows" in self.counts:
+            out |= {"strikes": self.strikes, "hits": self.landed}
+        if "balls" in self.counts:
+            out |= {"thrown": self.thrown, "avoided": self.avoided, "struck": self.struck}
+        if "errands" in self.counts:
+            out |= {"done": self.done, "hits": self.landed, "touched": self.touched}
+        return out
 
 
 def score_html(log: EventLog, most: int = 8) -> str:
     """Strikes and hits of every character, or balls thrown at each, avoided and not; the busiest
     ``most`` of a crowd, and the sum over all at whom balls are thrown.
     """
-    columns = {"strikes": log.thrown, "hits": log.landed}
-    if log.dodging:
-        columns = {"thrown": log.thrown, "avoided": log.avoided, "struck": log.struck}
-    if log.preparing:
-        columns = {"done": log.done, "hits": log.landed, "touched": log.touched}
-    key = log.thrown if log.dodging else log.landed
+    columns, balls = log.columns, log.counts == ("balls",)
+    key = log.thrown if balls else log.landed
     order = sorted(log.names, key=lambda n: -key[n]) if len(log.names) > most else log.names
     rows = "".join(
         _score_row(n, log.colours.get(n, GREY), [c[n] for c in columns.values()])
         for n in order[:most]
     )
-    if log.dodging and len(log.names) > 1:
+    if balls and len(log.names) > 1:
         rows += _score_row("all", "inherit", [sum(c.values()) for c in columns.values()])
     heads = "".join(f'<td style="text-align:right">{name}</td>' for name in columns)
     more = f'<div style="opacity:.6">and {len(log.names) - most} more</div>' * (len(order) > most)
@@ -189,10 +179,11 @@ def _line_html(event: Event, fps: float, colours: Mapping[str, str], faded: floa
     )
 
 
-def lines_html(log: EventLog, fps: float) -> str:
-    """The last events, newest first: when, who, what."""
+def lines_html(log: EventLog, fps: float, quiet: bool = False) -> str:
+    """The last events, newest first: when, who, what. quiet: decisions, too."""
     rows = "".join(
-        _line_html(event, fps, log.colours, min(0.05 * i, 0.5)) for i, event in enumerate(log.lines)
+        _line_html(event, fps, log.colours, min(0.05 * i, 0.5))
+        for i, event in enumerate(log.lines(quiet))
     )
     return (
         '<div style="padding:0 1em .6em;font-size:.8em;line-height:1.35;min-height:16em">'
