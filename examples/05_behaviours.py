@@ -24,7 +24,7 @@ behaviours = {
     ),
 }
 scene = World(load_scene("target"), builtin_layer(None), behaviours=behaviours)
-weights = {control.behaviour: control for control in scene.controls}
+weights = {tunable.field: tunable for tunable in scene.tunables}
 target = scene.objects[0].position
 
 

@@ -22,6 +22,7 @@ from PIL import Image
 
 from kumite.studio import Studio
 from kumite.studio import studio as studio_loop
+from kumite.studio.viewer import Viewer
 from tests.stranger import running
 
 if TYPE_CHECKING:
@@ -79,6 +80,13 @@ class Traffic:
     errors: list[str] = field(default_factory=list)
     websocket_bytes: int = 0
     websocket_frames: int = 0
+
+
+def viewer_of(studio: Studio) -> Viewer:
+    """What belongs to the first page of a studio; without a page to the server itself."""
+    pages = [v for v in studio.viewers.values() if v.client is not None]
+    found = pages or [*studio.viewers.values()]
+    return found[0] if found else studio.look_in(studio.server)
 
 
 def need_chromium() -> None:

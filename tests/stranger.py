@@ -19,6 +19,7 @@ from websockets.sync.connection import Connection
 from websockets.typing import Origin, Subprotocol
 
 from kumite.studio import Studio
+from kumite.studio.viewer import NOBODY
 
 CAMERA = {
     "type": "ViewerCameraMessage",
@@ -112,7 +113,9 @@ def goodbye(client: Connection) -> int | None:
 
 
 def control(studio: Studio, label: str) -> Any:
-    """The control of that label."""
+    """The control of that label, in a panel that all pages share."""
+    if NOBODY not in studio.viewers:
+        studio.look_in(studio.server)
     handles = studio.server.gui._gui_input_handle_from_uuid.values()
     return next(h for h in handles if getattr(h, "label", None) == label)
 

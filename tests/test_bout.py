@@ -128,7 +128,7 @@ def test_who_looks_further_ahead_lands_more(actions: Layer):
 
 def test_weights_and_depth_count_from_the_next_decision(actions: Layer):
     scene = _fight(actions, red={"style": "infighter"}, blue={"style": "infighter"})
-    controls = {c.name: c for c in scene.controls}
+    controls = {f"{c.who}: {c.field}": c for c in scene.tunables}
     _run(scene, 6.0)
     for name in ("red", "blue"):
         controls[f"{name}: preferred_distance"].set(3.0)

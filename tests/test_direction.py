@@ -47,8 +47,8 @@ def share(scene: World, decisions: list, name: str) -> float:
 
 def test_every_weight_can_be_tuned(fighters: Layer):
     scene = fight(fighters)
-    controls = {c.field: c for c in scene.controls_of(0)}
-    assert set(controls) == {*NAMES, "depth", "boredom", "restlessness"}
+    controls = {c.field: c for c in scene.tunables if c.who == "red"}
+    assert set(controls) == {*NAMES, "depth", "boredom", "restlessness", "facing_deg"}
     assert controls["facing"].value == scene.players[0].style.facing == 10.0
     for field, control in controls.items():
         value = control.minimum + 0.25 * (control.maximum - control.minimum)
@@ -58,16 +58,16 @@ def test_every_weight_can_be_tuned(fighters: Layer):
             control.set(float("nan"))
     player = scene.players[0]
     assert player.style.preferred_heading == pytest.approx(np.radians(-90.0))
-    assert {c.name for c in scene.controls} >= {"red: depth", "blue: place"}
+    assert {c.name for c in scene.tunables} >= {"red: tree: depth", "blue: tree: place"}
 
 
 def test_a_heading_brings_its_weight_and_the_weight_a_heading(fighters: Layer):
     scene = fight(fighters)
-    red, blue = ({c.field: c for c in scene.controls_of(k)} for k in range(2))
+    red, blue = ({c.field: c for c in scene.tunables if c.who == who} for who in ("red", "blue"))
     red["preferred_heading"].set(90.0)
     blue["heading"].set(20.0)
     assert red["heading"].value == 10.0 and blue["preferred_heading"].value == 0.0
-    red["heading"].set(1e6)
+    red["heading"].set(1e4)
     run(scene, 1.0)
     off = [
         abs(np.angle(np.exp(1j * (scene.cast.facing[0, 2] - np.pi / 2))))

@@ -7,7 +7,6 @@ import logging
 import threading
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -274,12 +273,12 @@ def test_the_doors_take_nothing_that_is_not_finite(library: Layer):
     """Our own calls check, too: a script may reach them without any page."""
     stage = World(load_scene("target"), library, seed=0)
     studio = Studio(stage, port=0)
-    home, control_of_stage = stage.objects[0].position.copy(), cast(Any, stage.controls[0])
+    home, control_of_stage = stage.objects[0].position.copy(), stage.tunables[0]
     try:
         for bad in (NAN, INF, -INF):
             for act in (
                 lambda b=bad: studio.set_speed(b),
-                lambda b=bad: studio.tune(control_of_stage, b),
+                lambda b=bad: control_of_stage.set(b),
                 lambda b=bad: studio.move_object(stage.objects[0].name, np.array([0.0, b, 0.0])),
             ):
                 with pytest.raises(KumiteError):
@@ -288,8 +287,8 @@ def test_the_doors_take_nothing_that_is_not_finite(library: Layer):
             studio.move_object(stage.objects[0].name, np.array([1e6, 0.0, 0.0]))
         with pytest.raises(KumiteError):
             studio.restart(-1)
-        studio.tune(control_of_stage, 1e9)
-        assert control_of_stage.value == control_of_stage.maximum
+        with pytest.raises(KumiteError, match="expected 0 to 12"):
+            control_of_stage.set(1e9)
         assert np.array_equal(stage.objects[0].position, home)
         with running(studio):
             with join(studio) as bad:

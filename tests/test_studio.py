@@ -17,6 +17,7 @@ from kumite.scene.events import Hit
 from kumite.studio import Studio, serve, wording
 from kumite.studio.pace import Pace
 from tests import browser
+from tests.browser import viewer_of
 from tests.stranger import running, wait
 
 
@@ -98,7 +99,7 @@ def test_a_recording_plays_to_its_end_and_can_be_sought(library: Layer):
 
 def _look_side_on(client, studio: Studio) -> None:
     """Put the camera where neither fighter hides the other."""
-    a, b = (studio.seen_at(r) for r in studio.stage.root_position)
+    a, b = (viewer_of(studio).seen_at(r) for r in studio.stage.root_position)
     along = (b - a) / np.linalg.norm(b - a)
     across = np.array([along[2], 0.0, -along[0]])
     middle = 0.5 * (a + b)
@@ -115,7 +116,9 @@ def test_both_bodies_are_seen_to_move(library: Layer):
         def differs() -> bool:
             """Around both pelvises, where they were, the picture has changed."""
             before, roots = browser.picture(page), stage.root_position.copy()
-            places = [browser.project(studio.seen_at(r), client.camera, page) for r in roots]
+            places = [
+                browser.project(viewer_of(studio).seen_at(r), client.camera, page) for r in roots
+            ]
             page.wait_for_timeout(700)
             after = browser.picture(page)
             changed = [
@@ -140,7 +143,7 @@ def test_both_bodies_are_seen_to_move(library: Layer):
         for k in range(2):
             chest = position[k, stage.skeleton.joint("chest")]
             patch = browser.around(
-                image, browser.project(studio.seen_at(chest), client.camera, page), 45
+                image, browser.project(viewer_of(studio).seen_at(chest), client.camera, page), 45
             )
             warm = patch[..., 0] - patch[..., 2]
             shares.append(((warm > 40).mean(), (warm < -40).mean()))
@@ -161,7 +164,7 @@ def test_the_target_is_dragged_and_the_boxer_goes_for_it(library: Layer):
         moved = False
         # The gizmo's arrows reach out from the target along the ground: try each, near to far.
         for axis, reach in itertools.product(np.eye(3)[[2, 0]], (0.22, 0.25, 0.19, 0.16, 0.3)):
-            here = studio.seen_at(thing.position)
+            here = viewer_of(studio).seen_at(thing.position)
             start = browser.project(here + reach * axis, client.camera, page)
             end = browser.project(here + (reach + 0.9) * axis, client.camera, page)
             browser.drag(page, start, end)

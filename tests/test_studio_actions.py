@@ -17,6 +17,7 @@ from kumite.scene import ActionPlayback, action_recording
 from kumite.studio import Studio
 from kumite.studio.action_list import Filter, action_html
 from tests import browser
+from tests.browser import viewer_of
 from tests.stranger import wait
 
 
@@ -185,7 +186,7 @@ def test_a_click_plays_an_action(whole: Layer):
         assert shown == pytest.approx((len(stage.recording) - 1) / stage.fps, abs=1e-2)
         page.wait_for_timeout(1500)
         chest, _ = forward_kinematics(stage.skeleton, stage.root_position, stage.wxyz)
-        place = studio.seen_at(chest[0, stage.skeleton.joint("chest")])
+        place = viewer_of(studio).seen_at(chest[0, stage.skeleton.joint("chest")])
         patch = browser.around(
             browser.picture(page), browser.project(place, client.camera, page), 25
         ).astype(int)

@@ -13,6 +13,7 @@ from kumite.scene.events import CheckPointReached, Decision
 from kumite.studio import Studio
 from kumite.studio.paths import Path, Sketch, on_floor, sketched
 from tests import browser
+from tests.browser import viewer_of
 from tests.stranger import wait
 from tests.test_studio_actions import _pick, _text
 
@@ -51,9 +52,10 @@ def test_one_fighters_controls_are_shown_however_many_there_are(fighters: Layer)
         stage = fight(fighters, pairs)
         studio = Studio(stage, port=0)
         try:
-            direction = studio._panel._direction
-            assert direction is not None
-            assert len(direction._sliders) == len(stage.controls_of(0)) == 15
+            sliders = viewer_of(studio).panel._sliders
+            assert sliders is not None
+            shown = {t.who for t in (sliders.tunables[name] for name in sliders.handles)}
+            assert shown == {"", "red"} and len(sliders.handles) == 21
         finally:
             studio.close()
 
@@ -88,7 +90,7 @@ def test_a_path_is_drawn_dragged_and_cleared_with_the_mouse(fighters: Layer):
     studio.toggle()
     with browser.watching(studio) as (page, client):
         middle = stage.root_position.mean(axis=0) * [1, 0, 1]
-        away = middle - (studio.from_page(client.camera.position) * [1, 0, 1])
+        away = middle - (viewer_of(studio).on_stage(client.camera.position) * [1, 0, 1])
         away /= np.linalg.norm(away)
         aside = np.array([away[2], 0.0, -away[0]])
         places = [middle - 0.5 * away + s * aside for s in (-0.8, 0.0, 0.8)]  # before their feet
@@ -98,7 +100,7 @@ def test_a_path_is_drawn_dragged_and_cleared_with_the_mouse(fighters: Layer):
             return stage.routes[0]
 
         def pixel(place: np.ndarray) -> tuple[float, float]:
-            return browser.project(studio.seen_at(place), client.camera, page)
+            return browser.project(viewer_of(studio).seen_at(place), client.camera, page)
 
         def redness() -> np.ndarray:
             """Of each place, as it is seen."""
@@ -115,7 +117,7 @@ def test_a_path_is_drawn_dragged_and_cleared_with_the_mouse(fighters: Layer):
         plain = redness()
         for k, place in enumerate(places):
             page.mouse.click(*pixel(place))
-            assert wait(lambda k=k: len(studio._sketch.places) == k + 1)
+            assert wait(lambda k=k: len(viewer_of(studio).own.sketch.places) == k + 1)
         assert stage.routes[0] is None  # not yet: it is being drawn
         page.get_by_role("button", name="Finish").click()
         assert wait(lambda: stage.routes[0] is not None)
@@ -160,7 +162,7 @@ def test_weights_and_actions_are_told_on_the_page(fighters: Layer):
     with browser.watching(studio) as (page, _):
         for folder in ("Weights", "Actions"):
             page.get_by_text(folder, exact=True).click()
-        fields = [c.field for c in stage.controls_of(0)]
+        fields = [t.field for t in stage.tunables if t.who == "red"]
 
         def slider(field: str):
             return page.get_by_role("slider").nth(1 + fields.index(field))  # the first is Speed

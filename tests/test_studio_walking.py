@@ -23,11 +23,13 @@ from kumite.scene import (
 )
 from kumite.scene import prepare as scenes
 from kumite.scene.events import Decision, Done, Hit, Launch, Passed
+from kumite.scene.leading import Walks
 from kumite.scene.wording import describe
 from kumite.studio import Studio
 from kumite.studio.leading import DOWN, LEFT, NEAR, RIGHT, STEP, UP, Leader, meant, way_seen
 from kumite.studio.wording import EventLog, lines_html, score_html
 from tests import browser
+from tests.browser import viewer_of
 from tests.shared import builtin
 from tests.telling import event
 from tests.test_studio import wait
@@ -128,16 +130,16 @@ def test_arrows_point_as_the_picture_shows_them():
 
 def test_a_click_sends_a_walker_to_a_place_or_to_a_ball(make: Make):
     stage = make("ball-kick", automatic=False)
-    leader = Leader(stage)
+    leader = Leader(Walks(stage, range(stage.users)), stage.names)
     for _ in range(30):
         stage.step()
     assert away(stage, np.zeros(2)) < 0.1, "nobody goes unasked"
     place = np.array([-2.0, -2.5])
     eye = np.array([0.0, 3.0, -9.0])
-    leader.point(eye, np.array([place[0], 0.0, place[1]]) - eye)
+    leader.point(eye, np.array([place[0], 0.0, place[1]]) - eye, stage.objects)
     assert np.allclose(stage.told[0], place)
     assert steps(stage, lambda: away(stage, place) < 0.8, 600)
-    leader.point(eye, stage.things.position[0] - eye)
+    leader.point(eye, stage.things.position[0] - eye, stage.objects)
     assert stage.thing[0] == 0 and np.isnan(stage.told[0]).all()
     assert steps(stage, lambda: stage.walkers.alpha[0] > 0.7, 1200), "it does not prepare"
     for _ in range(120):
@@ -151,7 +153,7 @@ def test_a_click_sends_a_walker_to_a_place_or_to_a_ball(make: Make):
 
 def test_an_arrow_sends_a_walker_a_few_steps(make: Make):
     stage = make("ball-kick", automatic=False)
-    leader = Leader(stage)
+    leader = Leader(Walks(stage, range(stage.users)), stage.names)
     leader.press(EYE, np.array([0.0, 1.0, 0.0]), np.array([0.0, 1.0, 0.0]), LEFT)
     assert np.allclose(stage.told[0], [STEP, 0.0])  # who looks along +Z has +X on the left
     assert steps(stage, lambda: away(stage, np.array([STEP, 0.0])) < 0.8, 400)
@@ -226,18 +228,18 @@ def test_the_posture_is_in_balance_as_it_was_found(make: Make, targets: Layer):
     stage = make("ball-kick")
     studio = Studio(stage, port=0)
     try:
-        prepared, preparing = studio._prepared, targets.preparing
+        prepared, preparing = viewer_of(studio).own.prepared, targets.preparing
         assert prepared is not None and preparing is not None
         balance = find_balance(targets.clips, targets.contacts)
         for t, label in enumerate(stage.motions):
-            posture, frame = prepared.posture(t), int(preparing.reference[t])
+            posture, frame = prepared.walk.reference(label), int(preparing.reference[t])
             a, b = posture.hull, np.roll(posture.hull, -1, axis=0)
             edge = (b - a) / np.linalg.norm(b - a, axis=1, keepdims=True)
             off = np.cross(np.insert(edge, 2, 0, 1), np.insert(posture.centre - a, 2, 0, 1))[:, 2]
             assert np.ptp(np.sign(off)) == 0, "the centre of mass is not over the support"
             assert np.abs(off).min() == pytest.approx(-balance.distance[frame], abs=1e-9)
-            assert abs(posture.vertices[:, 1].min()) < 0.03
-            said = prepared.about(label)
+            assert abs(prepared.skin(label)[:, 1].min()) < 0.03
+            said = posture.about
             before = int(preparing.hierarchy.targets.mark[t]) - frame
             assert f"frame {frame}" in said and f"{before} before the mark" in said
     finally:
@@ -249,23 +251,26 @@ def test_motions_are_begun_where_and_as_the_posture_is_shown(make: Make, name: s
     stage = make(name)
     studio = Studio(stage, port=0)
     try:
-        prepared = studio._prepared
+        prepared = viewer_of(studio).own.prepared
         assert prepared is not None
         prepared.asked.posture = prepared.asked.support = True
         shown, there, mine = prepared.look(), np.zeros(3), np.zeros(3)
         while not any(isinstance(e, Launch) for e in stage.events):
             shown = prepared.look()
-            ghost = prepared.posture(shown.target)
+            if shown.motion is None:  # it has not yet looked where it goes
+                stage.step()
+                continue
+            ghost = prepared.skin(shown.motion)
             x, z, yaw = shown.begins
-            there = rotate(from_yaw(yaw), ghost.vertices) + np.array([x, 0.0, z])
+            there = rotate(from_yaw(yaw), ghost) + np.array([x, 0.0, z])
             w = stage.walkers.shown
             mine, _ = skin_vertices(prepared.mesh, stage.skeleton, w.position[0], w.world_wxyz[0])
             assert stage.frame < 1500
             stage.step()
-        assert stage.walkers.doing[0] == shown.target
+        assert stage.motions[stage.walkers.doing[0]] == shown.motion
         off = np.linalg.norm(there - mine, axis=1)
         assert off.mean() < 0.2 and np.linalg.norm((there - mine).mean(axis=0)) < 0.2
-        assert prepared.look().target < 0, "it is shown on"
+        assert prepared.look().motion is None, "it is shown on"
     finally:
         studio.close()
 
@@ -274,7 +279,7 @@ def test_switches_show_and_hide(make: Make):
     stage = make("ball-kick")
     studio = Studio(stage, port=0)
     try:
-        prepared = studio._prepared
+        prepared = viewer_of(studio).own.prepared
         assert prepared is not None
         for _ in range(5):
             stage.step()
@@ -327,12 +332,16 @@ def test_a_ball_is_dragged_along_the_floor(make: Make):
     stage = make("ball-kick")
     studio = Studio(stage, port=0)
     try:
-        studio._follow.jump(np.array([1.0, -2.0]))
+        viewer = viewer_of(studio)
+        viewer.own.follow.jump(np.array([1.0, -2.0]))
+        viewer._pictures.clear()
         place = np.array([2.0, 0.11, 1.5])
-        eye = studio.seen_at(EYE)
-        studio._drag_object("ball 2", eye, studio.seen_at(place) - eye)
+        eye = viewer.seen_at(EYE)
+        studio._drag_object(
+            viewer_of(studio).id, "ball 2", eye, viewer_of(studio).seen_at(place) - eye
+        )
         assert np.allclose(stage.things.position[1], place)
-        studio._drag_object("ball 2", eye, np.array([0.0, 1.0, 1.0]))
+        studio._drag_object(viewer.id, "ball 2", eye, np.array([0.0, 1.0, 1.0]))
         assert np.allclose(stage.things.position[1], place)
         assert studio._targets._gizmos == {}
     finally:
@@ -370,7 +379,7 @@ def test_a_recording_is_shown_and_counted(make: Make, tmp_path: Path):
     save_recording(tmp_path / "k.rec", recording)
     studio = Studio(Playback(load_recording(tmp_path / "k.rec")), port=0)
     try:
-        assert studio._walk is None and studio._prepared is None and studio._log.preparing
+        assert viewer_of(studio).own.prepared is None and studio._log.counts == ("errands",)
         studio.seek(len(recording) - 1)
         assert studio._log.done["anna"] == done and studio._log.landed["anna"] == hits
         assert "touched" in score_html(studio._log) and "strikes" not in score_html(studio._log)
@@ -405,7 +414,7 @@ def test_clicks_and_keys_lead_a_walker(make: Make):
     with browser.watching(studio) as (page, client):
 
         def spot(point: np.ndarray) -> tuple[float, float]:
-            return browser.project(studio.seen_at(point), client.camera, page)
+            return browser.project(viewer_of(studio).seen_at(point), client.camera, page)
 
         ball = stage.things.position[0]
         page.mouse.click(*spot(ball))

@@ -49,6 +49,7 @@ def junk(random: Random, depth: int = 2) -> Any:
 
 def nearly(random: Random, studio: Studio) -> Any:
     """A message that a page may send, with something in it changed."""
+    studio.look_in(studio.server)
     handles = [*studio.server.gui._gui_input_handle_from_uuid.values()]
     handle = random.choice(handles)
     message: dict[str, Any] = dict(

@@ -45,7 +45,8 @@ class Tunable:
     @property
     def label(self) -> str:
         """What it is called in a list of one controller's."""
-        return self.field.removesuffix("_deg").replace("_", " ")
+        name = self.field.removesuffix("_deg").replace("_", " ")
+        return f"{name} limit" if self.field.endswith("_deg") else name
 
     @property
     def name(self) -> str:

@@ -193,7 +193,8 @@ class PrepareScene:
 
         def curve_of(part: str) -> float:
             at = 0 if part == "legs" else self.skeleton.joint("head")
-            return float(self.prepare.curve.get(part, curves(self.skeleton)[at]))
+            told = self.prepare.curve.get(part)
+            return float(curves(self.skeleton)[at] if told is None else told)
 
         def bend(part: str, value: float) -> None:
             told = {**self.prepare.curve, part: value}
@@ -213,8 +214,8 @@ class PrepareScene:
                 )
                 for spec in CURVE
             ]
-        foes = self.opponents
-        if foes.settings is not None:
+        foes = self.settings.opponents
+        if foes is not None:
 
             def rest(seconds: float) -> None:
                 self.settings = self.settings.model_copy(
@@ -230,7 +231,7 @@ class PrepareScene:
                     "",
                     "world",
                     "opponents.rest",
-                    lambda: float(self.opponents.settings.rest),
+                    lambda: float(self.settings.opponents.rest),
                     rest,
                 )
             )

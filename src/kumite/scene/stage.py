@@ -75,6 +75,8 @@ def _size(numbers: Sequence[float]) -> tuple[float, float, float]:
     return float(width), float(height), float(length)
 
 
+Count = Literal["blows", "balls", "errands"]
+
 # What a stage may offer. K characters; numbers of characters are rows of K.
 
 
@@ -113,8 +115,13 @@ class Directed(Protocol):
 class Throwable(Protocol):
     """Balls may be thrown at some."""
 
-    streams: bool  # whether balls come by themselves
+    @property
+    def streams(self) -> bool:
+        """Whether balls come by themselves."""
+        ...
 
+    @streams.setter
+    def streams(self, on: bool) -> None: ...
     @property
     def thrown_at(self) -> tuple[int, ...]:
         """Whom [n]."""
@@ -187,8 +194,13 @@ class Reference(NamedTuple):
 class Led(Protocol):
     """Some go where they are sent, and prepare for what they do there. Rows n are of ``led``."""
 
-    automatic: bool  # they go by themselves where they are not sent
+    @property
+    def automatic(self) -> bool:
+        """Whether they go by themselves where they are not sent."""
+        ...
 
+    @automatic.setter
+    def automatic(self, on: bool) -> None: ...
     @property
     def led(self) -> tuple[int, ...]:
         """Who [n]."""
@@ -228,7 +240,7 @@ class Offers:
     avoiding: Avoiding | None = None
     led: Led | None = None
     tunables: tuple[Tunable, ...] = ()
-    counts: tuple[Literal["blows", "balls", "errands"], ...] = ("blows",)  # what a score is kept of
+    counts: tuple[Count, ...] = ("blows",)  # what a score is kept of
     seen: Literal["beside", "before", "behind"] = "beside"  # from where, at first …
     yaw: float = 0.0  # … of whoever faces that way [rad]
     played: Playback | None = None  # a recording that can be wound
@@ -307,8 +319,9 @@ class Playback:
     def offers(self) -> Offers:
         """It can be wound; the score is of what happens in it."""
         kinds = {type(e) for e in self.recording.events}
-        counts = ("balls",) * (Throw in kinds) + ("errands",) * (Launch in kinds)
-        return Offers(counts=counts or ("blows",), played=self)
+        counts: list[Count] = ["balls"] if Throw in kinds else []
+        counts += ["errands"] if Launch in kinds else []
+        return Offers(counts=tuple(counts) or ("blows",), played=self)
 
     def load(self, recording: Recording) -> None:
         """Show another recording of the same characters and objects, from its start."""

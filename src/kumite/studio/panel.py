@@ -46,6 +46,10 @@ def prepare(gui: viser.GuiApi, title: str) -> None:
 class Desk(Director, Protocol):
     """What the panel's buttons reach; every call is safe from any thread."""
 
+    def wake(self) -> None:
+        """Look at what waits, and draw anew."""
+        ...
+
     def toggle(self) -> None:
         """Play or pause."""
         ...
@@ -131,7 +135,7 @@ class Panel:
             last = _last(len(offers.played.recording), stage.fps)
             self._timeline = gui.add_slider("Time", 0.0, last, step=TIME_STEP, initial_value=0.0)
             self._timeline.on_update(safely(lambda e: _seek(desk, e, stage.fps)))
-        follow = gui.add_checkbox("Follow", True, hint="keep the fighters in the middle")
+        follow = gui.add_checkbox("Follow", own.follow.on, hint="keep the fighters in the middle")
         follow.on_update(safely(lambda e: desk.direct(lambda: _set(own.follow, "on", e))))
         self._clock = gui.add_html("")
         self._throwing = self._volumes = self._walking = self._direction = self._sliders = None
@@ -254,12 +258,10 @@ def _set(holder: Any, name: str, event: Any) -> None:
 def _named(stage: Stage, offers: Offers) -> tuple[str, ...]:
     """Those of whom something can be chosen."""
     found = {t.who for t in offers.tunables if t.who}
-    for some in (
-        offers.directed and offers.directed.directed,
-        offers.led and offers.led.led,
-        offers.avoiding and offers.avoiding.avoiding,
-    ):
-        found |= {stage.names[k] for k in some or ()}
+    some = [] if offers.directed is None else [*offers.directed.directed]
+    some += [] if offers.led is None else [*offers.led.led]
+    some += [] if offers.avoiding is None else [*offers.avoiding.avoiding]
+    found |= {stage.names[k] for k in some}
     return tuple(name for name in stage.names if name in found)
 
 

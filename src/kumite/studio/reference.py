@@ -123,12 +123,15 @@ class Prepared:
         if handle.visible != on:
             handle.visible = on
 
-    def _add_body(self, motion: str) -> viser.MeshHandle:
+    def skin(self, motion: str) -> np.ndarray:
+        """Vertices [V, 3] m of a motion's reference posture, in its facing frame."""
         posture = self.walk.reference(motion)
-        vertices, _ = skin_vertices(self.mesh, self.skeleton, posture.position, posture.wxyz)
+        return skin_vertices(self.mesh, self.skeleton, posture.position, posture.wxyz)[0]
+
+    def _add_body(self, motion: str) -> viser.MeshHandle:
         return self.nodes.add_mesh_simple(
             f"{STAGE}/prepared/body/{motion}",
-            vertices.astype(np.float32),
+            self.skin(motion).astype(np.float32),
             self.mesh.faces,
             color=BODY_COLOUR,
             opacity=OPACITY,

@@ -78,7 +78,7 @@ class Studio:
         self._lock = threading.RLock()
         self._stop = threading.Event()
         self._wake = threading.Event()
-        self._coming = coming
+        self._coming, self._follows = coming, True
         self._take(stage)
         mesh = body_mesh(stage.skeleton)
         self.server = open_server(host, port, stage.title, strict=strict_port, allowed=allowed)
@@ -244,6 +244,15 @@ class Studio:
         with self._lock:
             self._pace.speed = within("speed", speed, SLOWEST, FASTEST)
         self._wake.set()
+
+    def set_follow(self, on: bool) -> None:
+        """Keep the fighters' midpoint in the middle of all pictures, or not: in pages that are open
+        and those to come. Each page may switch it for itself."""
+        with self._lock:
+            self._follows = on
+            for viewer in self.viewers.values():
+                viewer.own.follow.on = on
+        self.wake()
 
     def direct(self, act: Callable[[], Any]) -> Any:
         """Do something to the stage between two frames, and show it."""
@@ -415,6 +424,8 @@ class Studio:
         rewound: bool,
     ) -> None:
         """What of a picture is for one page only."""
+        if viewer.client is not None and viewer.id not in self.server.get_clients():
+            return  # it has just gone
         holds = self._targets.held(viewer.id) or self._paths.held(viewer.id)
         with contextlib.nullcontext() if viewer.client is None else viewer.client.atomic():
             viewer.draw(

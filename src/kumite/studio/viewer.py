@@ -10,7 +10,7 @@ field of view is set. What the studio knows of the last pictures is kept as :cla
 from __future__ import annotations
 
 from collections import deque
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import viser
@@ -73,6 +73,8 @@ class Viewer:
         mesh: BodyMesh,
         centre: np.ndarray,
         coming: Coming | None,
+        *,
+        follows: bool = True,
     ) -> None:
         """page: a browser's, or the server itself for a studio that nobody looks at. centre [2] m:
         the point of the stage that is in the middle at first.
@@ -83,6 +85,7 @@ class Viewer:
         scene = page.scene
         follow = ring.Follow(scene.add_frame(ring.STAGE, show_axes=False))
         follow.jump(centre)
+        follow.on = follows
         throwing, avoiding, led = offers.throwing, offers.avoiding, offers.led
         self.own = Own(
             follow,
@@ -100,7 +103,7 @@ class Viewer:
         self.panel = Panel(page.gui, desk, self.own, stage, offers, coming, self._eye)
         if offers.directed is not None or offers.throwing is not None or led is not None:
             # Not in a thread of its own: clicks stay in their order, and each knows its picture.
-            scene.on_click()(self._clicked)
+            scene.on_click()(cast(Any, self._clicked))
 
     # What the page does; viser's thread.
 
@@ -136,6 +139,11 @@ class Viewer:
         seen = seen or self.seen
         x, z = self.own.follow.centre if seen is None else seen.centre
         return np.asarray(point, dtype=np.float64) + np.array([x, 0.0, z])
+
+    def seen_at(self, point: np.ndarray) -> np.ndarray:
+        """Where a point [3] m of the stage lies in the page's world, as sent last."""
+        x, z = self.own.follow.centre
+        return np.asarray(point, dtype=np.float64) - np.array([x, 0.0, z])
 
     def _eye(self, event: Any) -> np.ndarray:
         return self.on_stage(a_place("camera", event.client.camera.position))
