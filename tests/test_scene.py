@@ -383,7 +383,7 @@ def test_behaviours_are_named_in_scene_files_and_tuned_while_it_runs(library: La
     assert away > 1.15
     assert not any(isinstance(e, Hit) for e in scene.events)
     weights = {c.field: c for c in scene.tunables}
-    assert set(weights) == {"approach", "strike", "keep_off"} and weights["keep_off"].value == 2.0
+    assert {"approach", "strike", "keep_off"} < set(weights) and weights["keep_off"].value == 2.0
     weights["strike"].set(6.0)
     weights["approach"].set(1.0)
     weights["keep_off"].set(0.0)

@@ -334,7 +334,7 @@ def test_a_ball_is_dragged_along_the_floor(make: Make):
     try:
         viewer = viewer_of(studio)
         viewer.own.follow.jump(np.array([1.0, -2.0]))
-        viewer._pictures.clear()
+        viewer._pictures = []
         place = np.array([2.0, 0.11, 1.5])
         eye = viewer.seen_at(EYE)
         studio._drag_object(

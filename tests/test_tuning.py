@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from kumite import studio
@@ -35,7 +36,7 @@ def test_a_tunable_keeps_its_bounds_and_says_what_is_wrong():
     ONE.set(4)
     assert ONE.value == 4.0
     for bad in (-0.1, 10.1, float("nan"), float("inf"), "3", True, None):
-        with pytest.raises(KumiteError, match="red: tree: given short: .*; expected 0 to 10 m"):
+        with pytest.raises(KumiteError, match=r"red: tree: given short: .*; expected 0 to 10 m"):
             ONE.set(bad)  # type: ignore[arg-type]
     assert ONE.value == 4.0
     assert find([ONE], ONE.name) is ONE
@@ -119,9 +120,11 @@ def test_each_kind_changes_what_happens():
             stage.reset(5)
             if name == "dodgeball":
                 stage.streams = True
+            shown = np.zeros_like(stage.wxyz)
             for _ in range(round(8.0 * stage.fps)):
                 stage.step()
-            found.append(stage.wxyz.tobytes())
+                shown = shown + stage.wxyz
+            found.append(shown.tobytes())
         tunable.set(before)
         assert found[0] != found[1], field
 

@@ -48,8 +48,8 @@ STYLE = (
     Spec("suitability", "points", 0, 1e4, "log", "worth of a defence that suits the attack"),
     Spec("preferred_heading", "°", -180, 180, "linear", "which way it looks, in the world"),
     Spec("heading", "points/rad²", 0, 1e4, "log", "what it costs to look another way"),
-    Spec("place", "", 0, 1e3, "log", "of its path; 10: a metre² off costs a solid blow"),
-    Spec("requirement", "", 0, 1e8, "log", "of wanted actions; 10⁶: a hundred solid blows"),
+    Spec("place", "", 0.01, 1e3, "log", "of its path; 10: a metre² off costs a solid blow"),
+    Spec("requirement", "", 1.0, 1e8, "log", "of wanted actions; 10⁶: a hundred solid blows"),
 )
 PLAYER = (
     Spec("depth", "levels", 1, DEEPEST - 1, "linear", "choices that it looks ahead"),

@@ -227,7 +227,11 @@ class EvasionScene:
             *reaction_tunables(self.names[:count], side.avoiders),
             *search_tunables(lambda: side.search, side.tune),
             tunable(KEPT, "", "avoid", "dodge.distance", kept, keep),
-            *policy_tunables(self.names[count:], self.attackers.fighters.tempers),
+            *(
+                t
+                for t in policy_tunables(self.names[count:], self.attackers.fighters.tempers)
+                if t.field != "again"  # which no scene file sets
+            ),
         ]
 
     def tunable(self, name: str) -> Tunable:

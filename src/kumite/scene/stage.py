@@ -319,8 +319,11 @@ class Playback:
     def offers(self) -> Offers:
         """It can be wound; the score is of what happens in it."""
         kinds = {type(e) for e in self.recording.events}
-        counts: list[Count] = ["balls"] if Throw in kinds else []
-        counts += ["errands"] if Launch in kinds else []
+        counts: list[Count] = []
+        if Throw in kinds:
+            counts.append("balls")
+        if Launch in kinds:
+            counts.append("errands")
         return Offers(counts=tuple(counts) or ("blows",), played=self)
 
     def load(self, recording: Recording) -> None:

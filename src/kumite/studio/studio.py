@@ -151,7 +151,16 @@ class Studio:
         The thread that runs."""
         with self._lock:
             centre = self._midpoint(self._look())
-            viewer = Viewer(page, self, self.stage, self._offers, self._mesh, centre, self._coming)
+            viewer = Viewer(
+                page,
+                self,
+                self.stage,
+                self._offers,
+                self._mesh,
+                centre,
+                self._coming,
+                follows=self._follows,
+            )
             self.viewers[viewer.id] = viewer
             self._redraw = True
         return viewer

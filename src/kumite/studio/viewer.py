@@ -96,7 +96,7 @@ class Viewer:
         )
         self._drawn = Drawn(scene, stage.names) if offers.directed is not None else None
         self._clicks: deque[Click] = deque(maxlen=MOST_CLICKS)
-        self._pictures: deque[Seen] = deque(maxlen=MOST_SEEN)
+        self._pictures: list[Seen] = []  # put anew, not changed: clicks come at any moment
         self._numbered_at = -np.inf
         self._number = 0
         self.wake = desk.wake
@@ -124,7 +124,7 @@ class Viewer:
     @property
     def seen(self) -> Seen | None:
         """The picture that the page shows, as far as it has told; None: none yet."""
-        pictures = list(self._pictures)
+        pictures = self._pictures
         if not pictures:
             return None
         if self.client is not None:
@@ -212,7 +212,7 @@ class Viewer:
         seen = Seen(self._number, own.follow.centre.copy(), objects, bodies)
         if not fresh and self._pictures:
             return  # the one with this number was sent first, and is what the page will tell of
-        self._pictures.append(seen)
+        self._pictures = [*self._pictures[1 - MOST_SEEN :], seen]
         if self.client is not None:
             # Not by the camera's handle, which takes so small a change for none.
             self.client._websock_connection.queue_message(
