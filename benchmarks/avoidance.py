@@ -29,9 +29,8 @@ from kumite.control.avoidance import Avoidance, AvoidanceSearch, Outcome, Standi
 from kumite.graph import Layer, build_avoidance, builtin_layer
 from kumite.kernels import avoid as kernels
 from kumite.rotation import planar_apply
-from kumite.scene import load_scene
-from kumite.scene.balls import aimed
-from kumite.scene.dodge import DodgeScene
+from kumite.scene import World, load_scene
+from kumite.scene.fire.balls import aimed
 from kumite.scene.events import Struck, Throw
 from kumite.scene.settings_dodge import BallsSettings, DodgersSettings, DodgeSettings
 from kumite.scene.throwing import AIM_SPREAD
@@ -103,10 +102,10 @@ class Thrown:
 
 
 @cache
-def scene_of(name: str) -> DodgeScene:
+def scene_of(name: str) -> World:
     settings = load_scene("dodgeball")
     new = {**dict(settings), "balls": BallsSettings(throws=100_000, every=EVERY)}
-    return DodgeScene(type(settings).model_construct(**new), library(name))
+    return World(type(settings).model_construct(**new), library(name))
 
 
 def play(name: str, throws: int, *, blind: bool = False) -> list[Thrown]:
@@ -117,7 +116,7 @@ def play(name: str, throws: int, *, blind: bool = False) -> list[Thrown]:
 def _play(name: str, seed: int, throws: int, blind: bool) -> list[Thrown]:
     scene = scene_of(name)
     scene.reset(seed)
-    search, out = scene.search, [Thrown() for _ in range(throws)]
+    search, out = scene.fire.search, [Thrown() for _ in range(throws)]
     plain = type(search).search
 
     def noted(standing, attacks, now, *, main=0):
@@ -144,21 +143,21 @@ def _play(name: str, seed: int, throws: int, blind: bool) -> list[Thrown]:
                 out[current].struck = True
         if current < 0:
             continue
-        ball = scene.balls.position[current % len(scene.balls.position)]
-        in_flight = scene.balls.attack[current % len(scene.balls.position)] is not None
+        ball = scene.fire.balls.position[current % len(scene.fire.balls.position)]
+        in_flight = scene.fire.balls.attack[current % len(scene.fire.balls.position)] is not None
         body = spheres.at(scene.cast.position[0], scene.cast.world_wxyz[0])
         first = body if first is None else first
         throw = out[current]
         if in_flight:
             near = (
-                np.linalg.norm(body - ball, axis=1) - spheres.radius - scene.balls_settings.radius
+                np.linalg.norm(body - ball, axis=1) - spheres.radius - scene.fire.settings.radius
             )
             if before is not None:  # as near as both come within the frame
                 s = before[0] - before[1]
                 u = (body - ball) - s
                 along = np.clip(-(s * u).sum(1) / np.maximum((u * u).sum(1), 1e-12), 0, 1)
                 swept = np.linalg.norm(s + along[:, None] * u, axis=1)
-                near = np.minimum(near, swept - spheres.radius - scene.balls_settings.radius)
+                near = np.minimum(near, swept - spheres.radius - scene.fire.settings.radius)
             throw.nearest = min(throw.nearest, float(near.min()))
             most = np.maximum(most, np.linalg.norm(body - first, axis=1))
             throw.moved = float(most.mean())
@@ -465,7 +464,7 @@ def barrage(throws: int) -> str:
     for every in (0.5, 0.05):
         balls = BallsSettings(throws=10_000, first=0.5, every=every, bearing_deg=40, pool=100)
         new = {**dict(settings), "balls": balls, "dodgers": DodgersSettings(count=count)}
-        scene = DodgeScene(type(settings).model_construct(**new), slow, seed=SEED)
+        scene = World(type(settings).model_construct(**new), slow, seed=SEED)
         for _ in range(30):
             scene.step()
         cpu, wall, slowest = time.process_time(), time.perf_counter(), 0.0

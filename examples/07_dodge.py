@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from kumite import AvoidanceSearch, DodgeScene, builtin_layer, load_scene
+from kumite import AvoidanceSearch, World, builtin_layer, load_scene
 from kumite.control import Standing, thrown
 from kumite.scene.events import Avoided, Struck, Throw
 
@@ -19,7 +19,7 @@ found = search.search(standing, [ball], now=0.0)
 print(f"{found.outcome}: {found.candidates} candidates, the best keeps {found.distance:.2f} m off")
 
 # A scene that throws by itself.
-scene = DodgeScene(load_scene("dodgeball"), library, seed=3)
+scene = World(load_scene("dodgeball"), library, seed=3)
 for _ in range(12 * round(scene.fps)):
     scene.step()
 for event in scene.events:

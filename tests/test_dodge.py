@@ -18,8 +18,8 @@ from kumite.control.avoider import Avoider
 from kumite.control.protocol import PASS, Plain, View
 from kumite.errors import KumiteError
 from kumite.graph import build_avoidance, find_avoiding_transitions
+from kumite.scene import World
 from kumite.scene.balls import Balls, capsules_of, velocity_to
-from kumite.scene.dodge import DodgeScene
 from kumite.scene.events import Avoided, Decision, Missed, Searched, Struck, Throw
 from kumite.scene.settings import SceneSettings
 from kumite.scene.settings_dodge import (
@@ -130,7 +130,7 @@ def test_balls_that_make_no_sense(wrong):
 # The scene ---------------------------------------------------------------------------------------
 
 
-def scene(seed: int = 1, count: int = 1, reaction: float = 0.0, every: float = 1.2) -> DodgeScene:
+def scene(seed: int = 1, count: int = 1, reaction: float = 0.0, every: float = 1.2) -> World:
     one = DodgerSettings(name="d", position=(0, 0), reaction=reaction)
     who: dict = {"dodger": [one.model_dump()]}
     if count > 1:
@@ -144,10 +144,10 @@ def scene(seed: int = 1, count: int = 1, reaction: float = 0.0, every: float = 1
             "balls": {"throws": 1000, "every": every, "first": 0.3, "speed": [5.0, 9.0]},
         }
     )
-    return DodgeScene(made, few(), seed=seed)
+    return World(made, few(), seed=seed)
 
 
-def told(made: DodgeScene, frames: int) -> tuple[bytes, list]:
+def told(made: World, frames: int) -> tuple[bytes, list]:
     poses = []
     for _ in range(frames):
         made.step()
@@ -172,8 +172,8 @@ def test_another_changes_nobody_elses_luck():
     for count in (2, 3):
         made = scene(4, 1, every=100.0)
         who = [DodgerSettings(name=f"d{k}", position=(3.0 * k, 0)) for k in range(count)]
-        made = DodgeScene(made.settings.model_copy(update={"dodger": tuple(who)}), few(), seed=4)
-        made.throwing.streams = False
+        made = World(made.settings.model_copy(update={"dodger": tuple(who)}), few(), seed=4)
+        made.fire.streams = False
         for _ in range(120):
             made.step()
         poses.append(made.wxyz[:2].copy())
@@ -194,8 +194,8 @@ def test_what_comes_near_nobody_is_not_avoided():
     made = scene(1, 1, every=100.0)
     here, ahead = made.root_position[0], np.array([0.0, 0.3, 5.0])
     aside = np.array([3.0, 0.5, 0.0])
-    made.throw(here + aside + ahead, here + aside - ahead, 9.0)
-    made.throw(here + ahead, here, 9.0)
+    made.fire.throw(here + aside + ahead, here + aside - ahead, 9.0)
+    made.fire.throw(here + ahead, here, 9.0)
     for _ in range(240):
         made.step()
     ends = {e.attack: e for e in made.events if isinstance(e, Struck | Avoided | Missed)}
@@ -223,13 +223,13 @@ def test_avoiding_helps():
 def test_nobody_sees_what_cannot_have_been_seen_yet(reaction: float):
     """Until a reaction after the throw all goes on as if nothing had been thrown."""
     with_ball, without = scene(3, 1, reaction, every=100.0), scene(3, 1, reaction, every=100.0)
-    with_ball.throwing.streams = without.throwing.streams = False
+    with_ball.fire.streams = without.fire.streams = False
     begin = 17
     for made in (with_ball, without):
         for _ in range(begin):
             made.step()
     ahead = np.array([0.0, 0.0, 7.0])
-    with_ball.throw(with_ball.root_position[0] + ahead, with_ball.root_position[0], 4.5)
+    with_ball.fire.throw(with_ball.root_position[0] + ahead, with_ball.root_position[0], 4.5)
     same = []
     for _ in range(45):
         with_ball.step()
@@ -268,13 +268,13 @@ def test_who_is_not_attacked_is_not_asked(monkeypatch):
         return watch(self, view)
 
     monkeypatch.setattr(Avoider, "watch", noted)
-    made.throwing.streams = False
+    made.fire.streams = False
     for _ in range(60):
         made.step()
     assert not asked
     here = made.root_position[2]
     behind = here - np.array([0.0, 0.0, 6.0])  # the ball goes on to the first, not to the second
-    made.throw(behind, here, 9.0, at=2)
+    made.fire.throw(behind, here, 9.0, at=2)
     for _ in range(200):
         made.step()
     assert 2 in {k for k, _ in asked} <= {0, 2} and max(f for _, f in asked) < 180
@@ -301,7 +301,7 @@ def test_a_plan_is_dropped_where_somebody_else_goes_elsewhere():
     made, table = scene(5, 2, every=0.4), few().table
     for controllers in made.controllers:
         controllers.insert(0, Whim())
-    at = [int(table.target[s]) for s in made.side.conductor.span]
+    at = [int(table.target[s]) for s in made._begun_in]
     for _ in range(900):
         made.step()
     told = [e for e in made.events if isinstance(e, Decision)]

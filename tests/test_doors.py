@@ -28,7 +28,6 @@ from tests.telling import event
 JUNK = (None, "sparring", 3, 1.5, [], {}, np.zeros(3), object())
 TAKES = {
     "World": lambda x: kumite.World(x, None),  # type: ignore[arg-type]
-    "DodgeScene": lambda x: kumite.DodgeScene(x, None),  # type: ignore[arg-type]
     "PrepareScene": lambda x: kumite.PrepareScene(x, None),  # type: ignore[arg-type]
     "library of a scene": lambda x: kumite.World(kumite.load_scene("sparring"), x),
     "measure": kumite.measure,

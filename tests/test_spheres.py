@@ -13,7 +13,7 @@ from kumite.body.spheres import load_spheres, save_spheres
 from kumite.clip import Skeleton
 from kumite.errors import KumiteError
 from kumite.performer import skeleton as figure
-from kumite.scene import DodgeScene, load_scene
+from kumite.scene import World, load_scene
 from kumite.scene.avoiding import volume_of
 from kumite.scene.settings_dodge import DodgeSettings
 from tests import dodging, toys
@@ -147,8 +147,8 @@ def test_a_scene_takes_an_edited_file(tmp_path):
     save_spheres(path, Spheres(laid.joint, laid.centre, laid.radius + 0.05), skeleton)
     dodge = DodgeSettings(spheres=str(path), index=False)
     settings = load_scene("dodgeball").model_copy(update={"dodge": dodge})
-    scene = DodgeScene(settings, library)
-    assert np.allclose(scene.search.spheres.radius, laid.radius + 0.05, atol=1e-4)
+    scene = World(settings, library)
+    assert np.allclose(scene.fire.search.spheres.radius, laid.radius + 0.05, atol=1e-4)
     missing = DodgeSettings(spheres=str(tmp_path / "none.toml"), index=False)
     with pytest.raises(KumiteError, match=r"none\.toml"):
         volume_of(missing, skeleton)

@@ -17,7 +17,6 @@ from kumite.graph import (
     save_library,
 )
 from kumite.scene import (
-    DodgeScene,
     Playback,
     PrepareScene,
     Recording,
@@ -36,7 +35,6 @@ __all__ = [
     "AvoidanceSearch",
     "Clip",
     "ClipSet",
-    "DodgeScene",
     "KumiteError",
     "Layer",
     "Library",

@@ -94,7 +94,7 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
         refuse_no_library(library)
     from kumite.control import cache_folder
     from kumite.graph import builtin_layer, builtin_library, load_library
-    from kumite.scene import DodgeScene, EvasionScene, PrepareScene, World
+    from kumite.scene import EvasionScene, PrepareScene, World
     from kumite.scene.needs import needs
     from kumite.warm import warm
 
@@ -124,8 +124,6 @@ def _live_scene(settings: Any, library: Path | None, seed: int) -> Any:
                 stages(f"learning to approach: batch {batch}, {changed:.1%} of states changed")
 
             return PrepareScene(settings, found, seed=seed, cache=cache, progress=learning)
-        if settings.dodging:
-            return DodgeScene(settings, found, seed=seed)
         return World(settings, found, seed=seed, cache=cache, progress=Training(bars))
 
 

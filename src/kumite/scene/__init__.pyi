@@ -1,5 +1,4 @@
 from kumite.scene.actions import ActionPlayback, action_recording
-from kumite.scene.dodge import DodgeScene
 from kumite.scene.evasion import EvasionScene
 from kumite.scene.events import Event, EventIndex
 from kumite.scene.metrics import CharacterMetrics, Metrics, measure
@@ -22,7 +21,6 @@ __all__ = [
     "ActionPlayback",
     "Character",
     "CharacterMetrics",
-    "DodgeScene",
     "EvasionScene",
     "Event",
     "EventIndex",

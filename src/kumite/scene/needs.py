@@ -68,6 +68,7 @@ def wanted_layers(settings: SceneSettings, has: Collection[str] = ("frames",)) -
     out = ["actions"] if tree else []
     if any(p.by_policy for p in people) and not tree:
         out.append(next((n for n in ("frames", "actions") if n in has), "frames"))
-    out += ["avoidance"] if settings.avoiding else []
+    roams = any("roam" in p.controllers for p in people)
+    out += ["avoidance"] if settings.avoiding or roams else []
     out += ["preparation"] if settings.preparing else []
     return tuple(out) or ("actions",)  # of who leaves everything to others

@@ -10,7 +10,6 @@ from kumite.checked import checked
 from kumite.checks import number
 from kumite.control.conductor import ControllerError
 from kumite.errors import KumiteError
-from kumite.scene.dodge import DodgeScene
 from kumite.scene.evasion import EvasionScene
 from kumite.scene.memory import refuse_too_many
 from kumite.scene.metrics import source_skate
@@ -23,7 +22,7 @@ MOST_BYTES = 16e9  # of one recording
 
 @checked
 def record(
-    scene: World | DodgeScene | EvasionScene | PrepareScene,
+    scene: World | EvasionScene | PrepareScene,
     seconds: float,
     progress: Callable[[float], None] = lambda share: None,
     stop: Callable[[], bool] = lambda: False,

@@ -28,6 +28,7 @@ from kumite.scene.settings_people import (
     CrowdSettings,
     Person,
     of_character,
+    of_dodger,
     of_fighter,
 )
 from kumite.scene.settings_prepare import (
@@ -89,17 +90,20 @@ class SceneSettings(Settings):
 
     @cached_property
     def people(self) -> tuple[Person, ...]:
-        """All [[character]]s and [[fighter]]s, in that order, those of [crowd] and [pairs], too."""
+        """All [[character]]s, [[fighter]]s and [[dodger]]s, in that order, those of [crowd],
+        [pairs] and [dodgers], too; dodgers whom [[attacker]]s attack are in a scene of their own.
+        """
         return (
             *(of_character(c) for c in self.characters),
             *(of_fighter(f) for f in self.fighters),
+            *(of_dodger(d) for d in self.dodging if not self.attacker),
         )
 
     @cached_property
     def avoiding(self) -> tuple[str, ...]:
         """The names of all who avoid what comes at them."""
         people = (p.name for p in self.people if "avoid" in p.controllers)
-        return (*(d.name for d in self.dodging), *people)
+        return (*(d.name for d in self.dodging if self.attacker), *people)
 
     @cached_property
     def preparing(self) -> tuple[str, ...]:
@@ -269,7 +273,8 @@ class SceneSettings(Settings):
     @property
     def names(self) -> tuple[str, ...]:
         """Of all that move by themselves."""
-        groups = (self.people, self.dodging, self.attacker, self.walking)
+        attacked = self.dodging if self.attacker else ()
+        groups = (self.people, attacked, self.attacker, self.walking)
         foes = range(self.opponents.count) if self.opponents else ()
         return (
             *(c.name for group in groups for c in group),

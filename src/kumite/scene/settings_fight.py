@@ -25,7 +25,7 @@ from kumite.scene.settings_base import (
 )
 
 Controllers = Annotated[
-    tuple[Literal["avoid", "prepare", "fight", "external"], ...], Field(min_length=1)
+    tuple[Literal["avoid", "fight", "prepare", "roam", "external"], ...], Field(min_length=1)
 ]
 """Who decides for a character, by priority: the first that has something to say is heard."""
 Weight = Annotated[Finite, Field(ge=0)]
@@ -42,7 +42,7 @@ def refuse_controllers(controllers: tuple[str, ...]) -> None:
             f'{told}; expected another behind "avoid", which decides only while something comes'
         )
     for name in controllers[:-1]:
-        if name in ("prepare", "external"):
+        if name in ("prepare", "roam", "external"):
             raise ValueError(
                 f'{told}; expected "{name}" last: it always has something to say, so nobody '
                 "behind it is heard"

@@ -21,6 +21,7 @@ from kumite.scene.settings_base import (
     Reaction,
     Settings,
 )
+from kumite.scene.settings_dodge import DodgerSettings
 from kumite.scene.settings_fight import (
     Controllers,
     FighterSettings,
@@ -172,4 +173,12 @@ def of_fighter(f: FighterSettings) -> Person:
     """A ``[[fighter]]``."""
     return Person(
         f.name, f.position, f.yaw_deg, f.against, None, f.controllers, f, (), reaction=f.reaction
+    )
+
+
+def of_dodger(d: DodgerSettings) -> Person:
+    """A ``[[dodger]]``."""
+    controllers = ("avoid", "roam")
+    return Person(
+        d.name, d.position, d.yaw_deg, None, None, controllers, None, (), reaction=d.reaction
     )

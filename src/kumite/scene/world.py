@@ -15,13 +15,11 @@ import numpy as np
 from kumite.body import ARMS
 from kumite.clip import LIMBS
 from kumite.control import Behaviour, Progress, Route
-from kumite.control.attack import Attack
-from kumite.control.avoidance import Avoidance, Outcome
-from kumite.control.avoider import Avoider, Threat
 from kumite.control.conductor import Conductor, ControllerError
 from kumite.control.engage import Engage
 from kumite.control.game_tree import CALM, Decision, GameTree
 from kumite.control.protocol import SELF, Controller, External, View
+from kumite.control.roamer import Roamer
 from kumite.control.tuning import Tunable, find
 from kumite.errors import KumiteError, unknown
 from kumite.graph import Layer, Library
@@ -30,16 +28,15 @@ from kumite.kernels.blow import NOBODY
 from kumite.kernels.moves import FALL, NOTHING
 from kumite.scene import events
 from kumite.scene.apart import push_apart
-from kumite.scene.avoiding import search_of, searched
+from kumite.scene.avoiding import search_of
 from kumite.scene.controls import (
     OrderControl,
-    reaction_tunables,
     rule_tunables,
-    search_tunables,
     tree_tunables,
 )
 from kumite.scene.doors import check_scene, check_settings
 from kumite.scene.events import Cue, Event, Hit, RunOver
+from kumite.scene.fire import Fire
 from kumite.scene.floor import Floor, Landing
 from kumite.scene.hanging import Hanging
 from kumite.scene.leading import Walks
@@ -56,9 +53,7 @@ from kumite.scene.settings_fight import CHANGES, BoutSettings, CueSettings
 from kumite.scene.stage import Offers, SceneObject
 from kumite.scene.starts import draw_starts, stream
 from kumite.scene.story import Story
-from kumite.scene.throwing import ByHand, Throwing
 from kumite.scene.tree_fighter import TreeFighter
-from kumite.scene.volumes import Volumes
 from kumite.synthesis.recoil import RECOIL
 
 REPAIRING = 1.0  # s after which those who aim at the nearest look round again
@@ -117,9 +112,12 @@ class World:
         characters.
         """
         check_settings(settings)
-        several = settings.crowd.count if settings.crowd else 0
+        many = (settings.crowd, settings.dodgers)
+        several = sum(m.count for m in many if m is not None)
         joints = getattr(getattr(library, "clips", None), "skeleton", ())
-        refuse_too_many(len(settings.character) + several, max(len(joints), 1))
+        refuse_too_many(
+            len(settings.character) + len(settings.dodger) + several, max(len(joints), 1)
+        )
         wanted = wanted_layers(settings, getattr(library, "layers", ("frames",)))
         self.library = check_scene(settings, library, seed, *wanted[:1])
         if not settings.people:
@@ -145,8 +143,8 @@ class World:
         self.fight: TreeFighter | None = None  # of those who fight by game tree
         self.policy: PolicyFighter | None = None  # of those who fight by policies
         self._preparer: Preparer | None = None  # of those who prepare
-        self._throwing: Throwing | None = None
-        self._avoiders: dict[int, Avoider] = {}
+        self._fire: Fire | None = None  # what is thrown, and who avoids it
+        self._roamer: Roamer | None = None  # of those who only move about
         if any(p.by_tree for p in people):
             self.fight = TreeFighter(
                 every.layer("actions"),
@@ -170,7 +168,7 @@ class World:
                 behaviours=behaviours,
                 progress=progress,
             )
-        if settings.avoiding:
+        if "avoidance" in wanted:
             self._equip(every)
         if settings.preparing:
             self._preparer = Preparer(settings, every, cache=cache)
@@ -182,11 +180,16 @@ class World:
         if self.bout.arena is not None:
             self._edge.append(SceneObject(ARENA, np.zeros(3), self.bout.arena, line=True))
         self.reset(seed)
+        if self._fire is not None:
+            self._fire.search_once()
 
     def _controller(self, k: int, name: str) -> Controller:
         """What a scene file calls a controller, for character k."""
         if name == "avoid":
-            return self._avoiders[k]
+            return self.fire.avoiders[k]
+        if name == "roam":
+            assert self._roamer is not None
+            return self._roamer
         if name == "external":
             return External()
         person = self.settings.people[k]
@@ -199,21 +202,30 @@ class World:
         return found if last else Engage(found, person.engage, self._lies)
 
     def _equip(self, library: Library) -> None:
-        """Let those who avoid see what is thrown."""
-        avoidance = library.layer("avoidance")
-        going_on = None
-        if self.fight is not None:
-            going_on = np.flatnonzero(np.isin(self.fight.tree.kinds, CALM))
-        _, away = nearest(self.library, going_on)
-        search = search_of(avoidance, self.settings.dodge or DodgeSettings())
-        for k, p in enumerate(self.settings.people):
-            if "avoid" in p.controllers:
-                self._avoiders[k] = Avoider(
-                    search,
-                    lambda found, threat, k=k: self._tell_search(k, found, threat),
-                    reaction=p.reaction,
-                    away=away,
-                )
+        """Let those who avoid see what is thrown, and those who roam know where they belong."""
+        layer, people = library.layer("avoidance"), self.settings.people
+        homes = np.array([[*p.position, np.radians(p.yaw_deg)] for p in people])
+        dodge = self.settings.dodge or DodgeSettings()
+        self._roamer = Roamer(layer, homes, watched=self._watched, distance=dodge.distance)
+        away = None  # an avoidance is played to its end where nobody plans on another layer
+        if self.library is not layer:
+            calm = None
+            if self.fight is not None:
+                calm = np.flatnonzero(np.isin(self.fight.tree.kinds, CALM))
+            _, away = nearest(self.library, calm)
+        self._fire = Fire(
+            self.names,
+            {k: p.reaction for k, p in enumerate(people) if "avoid" in p.controllers},
+            search_of(layer, dodge),
+            self.settings.balls or BallsSettings(),
+            away=away,
+            searches=dodge.searches,
+        )
+
+    def _watched(self, k: int) -> np.ndarray | None:
+        """Where the opponent of character k is [2] m."""
+        o = int(self.floor.opponent[k])
+        return None if o == NOBODY else self.cast.root_position[o, [0, 2]]
 
     def reset(self, seed: int) -> None:
         """Start again from the beginning, with a seed."""
@@ -257,21 +269,11 @@ class World:
             chooses=lambda k: not (self._lies(k) or self._poses_itself(k)),
             begin_many=self._begin_many,
         )
-        self._conductor.start(self.seed)
+        alone = self.fight is None and self.policy is None
+        self._conductor.start(self.seed, self._begun_in.tolist() if alone else None)
         self._posed_by = [0] * count  # the number of the controller that poses each, if one does
-        if self._avoiders:
-            self._throwing = Throwing(
-                self.settings.balls or BallsSettings(),
-                self.cast,
-                self.floor.body,
-                next(iter(self._avoiders.values())).search.spheres,
-                self.seed,
-                sorted(self._avoiders),
-                self.names,
-                self._mind,
-                self._forget,
-                self.events.append,
-            )
+        if self._fire is not None:
+            self._fire.begin(self.floor, self.seed, self.events.append)
 
     def _place(self) -> np.ndarray:
         """Everyone where it begins; the stretches [K] of the actions' layer after which they stand,
@@ -279,12 +281,14 @@ class World:
         people, table = self.settings.people, self.library.table
         homes = np.array([[*p.position, np.radians(p.yaw_deg)] for p in people])
         streams = [stream(self.seed, k) for k in range(len(people))]
+        at_ends = self.fight is not None
         if self.fight is not None:
             common = self.fight.common
+        elif self._roamer is not None and self.library is self._roamer.library:
+            common = self._roamer.restful()
         else:  # on the way to a state with many ways out: the usual guard, not a blow's end
             ways = np.diff(table.action_start)
             common = np.flatnonzero(ways[table.target] >= np.quantile(ways, 0.75))
-        at_ends = self.fight is not None
         stretch, begins = draw_starts(self.library, common, streams, at_ends=at_ends)
         bout = self.bout
         if bout.scatter or bout.scatter_deg:
@@ -292,6 +296,7 @@ class World:
             homes += spread * np.array([rng.uniform(-1.0, 1.0, 3) for rng in streams])
         for k, home in enumerate(homes):
             self.cast.place(k, int(table.target[stretch[k]]), home, frame=int(begins[k]))
+        self._begun_in = stretch
         return stretch if at_ends else np.full(len(people), -1)
 
     # What is shown -------------------------------------------------------------------------------
@@ -310,7 +315,7 @@ class World:
 
     @property
     def objects(self) -> list[SceneObject]:
-        balls = [] if self._throwing is None else self._throwing.balls.objects
+        balls = [] if self._fire is None else self._fire.balls.objects
         things = [] if self._preparer is None else self._preparer.scene.objects
         return self.hanging.objects + things + self.story.objects + self._edge + balls
 
@@ -343,16 +348,8 @@ class World:
                 out += tree_tunables(self.names[k], self.fight.players[k], self.fight.tree)
         if self.policy is not None:
             out += self.policy.tunables(self.names)
-        if self._avoiders:
-            avoiders = [self._avoiders[k] for k in sorted(self._avoiders)]
-
-            def tune(**rules: object) -> None:
-                search = avoiders[0].search.tuned(**rules)
-                for avoider in avoiders:
-                    avoider.search = search
-
-            out += reaction_tunables([self.names[k] for k in sorted(self._avoiders)], avoiders)
-            out += search_tunables(lambda: avoiders[0].search, tune)
+        if self._fire is not None:
+            out += self._fire.tunables
         if self._preparer is not None:
             out += self._preparer.scene.tunables
         return out if self.fight is None else [*out, *rule_tunables(self.fight.tree)]
@@ -370,26 +367,29 @@ class World:
     @property
     def offers(self) -> Offers:
         """What may be done with it while it runs."""
-        preparer, throwing = self._preparer, self._throwing is not None
+        preparer, fire = self._preparer, self._fire
         fights = self.fight is not None or self.policy is not None
         return Offers(
             directed=self if self.directed else None,
-            throwing=ByHand(self._throws, lambda: self.frame) if throwing else None,
-            avoiding=Volumes(self._avoiders, lambda: self.cast) if throwing else None,
+            throwing=fire,
+            avoiding=None if fire is None else fire.volumes,
             led=None if preparer is None else Walks(preparer.scene, preparer.who),
             tunables=tuple(self.tunables),
             counts=(
                 *(("blows",) if fights else ()),
-                *(("balls",) if throwing else ()),
+                *(("balls",) if fire is not None else ()),
                 *(("errands",) if preparer is not None else ()),
             ),
-            seen="beside" if fights else "before" if throwing else "behind",
+            seen="beside" if fights else "before" if fire is not None else "behind",
             yaw=float(self.cast.facing[0, 2]),
         )
 
-    def _throws(self) -> Throwing:
-        assert self._throwing is not None  # somebody avoids
-        return self._throwing
+    @property
+    def fire(self) -> Fire:
+        """What is thrown, and those who avoid it. Errors: nobody avoids anything."""
+        if self._fire is None:
+            raise KumiteError(f"nobody avoids anything in {self.title!r}")
+        return self._fire
 
     def orders_of(self, k: int) -> list[OrderControl]:
         """What one who fights by game tree is told of actions: A⁺, A⁻ and the action set."""
@@ -477,8 +477,8 @@ class World:
         if self.error is not None:
             raise self.error
         self.story.step(self, self.frame / self.fps)
-        if self._throwing is not None:
-            self._throwing.due(self.frame)
+        if self._fire is not None:
+            self._fire.due(self.frame)
         self.hanging.look()
         if self.policy is not None and self.frame and self.frame % round(REPAIRING * self.fps) == 0:
             self._aim()
@@ -493,8 +493,8 @@ class World:
         if len(self.names) <= MOST_PHYSICAL:  # among many trunks are kept apart, limbs are not
             push_apart(self.floor)
         self.frame += 1
-        if self._throwing is not None:
-            self._throwing.step(self.frame)
+        if self._fire is not None:
+            self._fire.step(self.frame)
         if self.fight is not None:
             self.fight.frame = self.frame
             self.fight.pass_check_points()
@@ -503,6 +503,8 @@ class World:
         if happened:
             strikes = self.library.strikes
             for k, s, blow in self.floor.thrown:
+                if self.floor.opponent[k] == self.thing[k] == NOBODY:
+                    continue  # arms of who strikes at nobody swing as if they struck
                 self.events.append(events.strike(self.frame, self.names[k], s, blow, strikes))
             for landing in self.floor.landings:
                 self._land(landing)
@@ -668,20 +670,6 @@ class World:
                 blow=landing.blow,
             )
         )
-
-    def _mind(self, k: int, attack: Attack, number: int, ball: str) -> None:
-        """Character k sees a ball coming."""
-        self._avoiders[k].mind(attack, number, self.frame / self.fps, ball=ball)
-
-    def _forget(self, number: int) -> None:
-        """What was thrown is over."""
-        for avoider in self._avoiders.values():
-            avoider.forget(number)
-
-    def _tell_search(self, k: int, found: Avoidance, threat: Threat) -> None:
-        if found.outcome == Outcome.FOUND and self._throwing is not None:
-            self._throwing.found(threat.number)
-        self.events.append(searched(self.frame, self.names[k], found, threat))
 
     # The story -----------------------------------------------------------------------------------
 
