@@ -18,7 +18,7 @@ from kumite.graph.errands import build_preparation
 from kumite.graph.joins import JoinBound
 from kumite.graph.layer import Layer, build_frames
 from kumite.graph.whole import build_actions
-from kumite.layers import LAYERS
+from kumite.layers import LAYERS, TAKES
 
 
 @brief
@@ -75,8 +75,8 @@ class Library:
         if name not in self.layers:
             why = self.missing.get(name, "it was not built")
             raise KumiteError(
-                f"the library has no layer {name!r} ({why}); expected it among "
-                f"{', '.join(self.layers)}: build it again (kumite build), from clips that allow it"
+                f"the library has no layer {name!r} ({why}), only {', '.join(self.layers)}; "
+                f"it takes {TAKES[name]}: build it again (kumite build) with such clips"
             )
         return self.layers[name]
 
