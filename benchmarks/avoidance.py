@@ -30,7 +30,7 @@ from kumite.graph import Layer, build_avoidance, builtin_layer
 from kumite.kernels import avoid as kernels
 from kumite.rotation import planar_apply
 from kumite.scene import World, load_scene
-from kumite.scene.fire.balls import aimed
+from kumite.scene.balls import aimed
 from kumite.scene.events import Struck, Throw
 from kumite.scene.settings_dodge import BallsSettings, DodgersSettings, DodgeSettings
 from kumite.scene.throwing import AIM_SPREAD
@@ -149,9 +149,7 @@ def _play(name: str, seed: int, throws: int, blind: bool) -> list[Thrown]:
         first = body if first is None else first
         throw = out[current]
         if in_flight:
-            near = (
-                np.linalg.norm(body - ball, axis=1) - spheres.radius - scene.fire.settings.radius
-            )
+            near = np.linalg.norm(body - ball, axis=1) - spheres.radius - scene.fire.settings.radius
             if before is not None:  # as near as both come within the frame
                 s = before[0] - before[1]
                 u = (body - ball) - s
@@ -320,7 +318,7 @@ def chosen(throws: int) -> str:
     """How far the body moves for what is chosen, and what agrees."""
     moves, agrees = [], []
     for name in graphs():
-        search = scene_of(name).search
+        search = scene_of(name).fire.search
         rng, far = np.random.default_rng(SEED), steps_and_leaps(search)
         ours, first, step, leap = [], [], [], []
         same = {k: [] for k in ("e", "e_avoid", "e_body", "e_time")}
@@ -399,7 +397,7 @@ def _repeated(work: Callable[[], object], repeats: int = 5) -> float:
 
 def anywhere(name: str, count: int) -> list[tuple[Standing, list[Attack], float]]:
     """Throws at who begins a random edge, as the scene aims them."""
-    search, rng = scene_of(name).search, np.random.default_rng(SEED)
+    search, rng = scene_of(name).fire.search, np.random.default_rng(SEED)
     table, facing, out = search.library.table, search.library.clips.facing, []
     for stretch in rng.integers(len(table.first), size=count):
         frame = int(table.first[stretch])
@@ -418,7 +416,7 @@ def timings(throws: int) -> str:
     rules = DodgeSettings().search()
     for name in graphs():
         asked = anywhere(name, max(throws // 2, 4 * FEW_THROWS))
-        search, base = scene_of(name).search, np.nan
+        search, base = scene_of(name).fire.search, np.nan
         known = [a for a in asked if search.search(*a).indexed][:100]
         for index, culling in PAPER:
             search = AvoidanceSearch(library(name), replace(rules, index=index, culling=culling))

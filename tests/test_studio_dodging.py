@@ -14,9 +14,9 @@ from kumite.errors import KumiteError
 from kumite.graph import Layer
 from kumite.rotation import planar_apply
 from kumite.scene import (
-    DodgeScene,
     Playback,
     SceneSettings,
+    World,
     load_recording,
     load_scene,
     record,
@@ -45,13 +45,13 @@ def avoiders() -> Layer:
     return builtin("avoidance", "avoidance")
 
 
-def dodgeball(library: Layer, throws: int = 0, count: int | None = None) -> DodgeScene:
+def dodgeball(library: Layer, throws: int = 0, count: int | None = None) -> World:
     settings: SceneSettings = load_scene("dodgeball" if count is None else "barrage")
     settings = settings if count is None else with_count(settings, count)
-    return DodgeScene(with_throws(settings, throws), library, seed=1)
+    return World(with_throws(settings, throws), library, seed=1)
 
 
-def kinds(stage: DodgeScene) -> list[str]:
+def kinds(stage: World) -> list[str]:
     return [e.kind for e in stage.events]
 
 
@@ -135,7 +135,7 @@ def test_a_click_means_the_picture_in_which_it_was_made(avoiders: Layer):
         assert np.allclose(viewer._clicks[0].eye, EYE)  # not where that is by now
         studio._tick()
         assert "throw" in kinds(stage)
-        ball = stage.balls.attack[0]
+        ball = stage.fire.balls.attack[0]
         assert ball is not None
         off = np.linalg.norm(ball.centre[:, 0] - before, axis=1).min()
         assert off < 0.3 < np.linalg.norm([1.5, 0.5])
@@ -145,7 +145,7 @@ def test_a_click_means_the_picture_in_which_it_was_made(avoiders: Layer):
 
 def test_throws_by_hand_leave_the_stream_as_it_is(avoiders: Layer):
     by_itself, helped = dodgeball(avoiders, throws=3), dodgeball(avoiders, throws=3)
-    helped.throw_one(20.0, 0.3)
+    helped.fire.throw_one(20.0, 0.3)
     for _ in range(240):
         by_itself.step()
         helped.step()
@@ -159,16 +159,16 @@ def test_throws_by_hand_leave_the_stream_as_it_is(avoiders: Layer):
 
 def test_the_stream_is_switched_on_and_off(avoiders: Layer):
     stage = dodgeball(avoiders)
-    assert not stage.streams
+    assert not stage.fire.streams
     for _ in range(330):
         stage.step()
     assert "throw" not in kinds(stage)
-    stage.streams = True
+    stage.fire.streams = True
     for _ in range(330):
         stage.step()
     count = kinds(stage).count("throw")
     assert count in (2, 3)  # every 2.5 s, and none made up for
-    stage.streams = False
+    stage.fire.streams = False
     for _ in range(200):
         stage.step()
     assert kinds(stage).count("throw") == count
@@ -179,26 +179,27 @@ def test_the_stream_is_switched_on_and_off(avoiders: Layer):
 
 def test_controls_act_on_the_next_search_and_no_other(avoiders: Layer):
     stage = dodgeball(avoiders)
-    before = stage.search
+    before = stage.fire.search
     controls = {c.field: c for c in stage.tunables}
     assert {"avoidance", "body", "timescale", "window", "clearance"} < set(controls)
     for field, value in (("body", 3.0), ("window", 2.0), ("clearance", 0.1)):
         controls[field].set(value)
         assert controls[field].value == value
-    assert stage.search.settings.weights == (1.0, 3.0, 1.0)
-    assert stage.search.settings.window == 2.0 and stage.search.weighing.clearance == 0.1
+    assert stage.fire.search.settings.weights == (1.0, 3.0, 1.0)
+    assert stage.fire.search.settings.window == 2.0 and stage.fire.search.weighing.clearance == 0.1
     assert (
-        all(a.search is stage.search for a in stage.side.avoiders) and before.settings.window == 1.0
+        all(a.search is stage.fire.search for a in stage.fire.avoiders.values())
+        and before.settings.window == 1.0
     )
     assert before.weighing.clearance == 0.02
-    assert stage.search.index is before.index and stage.search.masks is before.masks
+    assert stage.fire.search.index is before.index and stage.fire.search.masks is before.masks
     stage.reset(2)
-    assert stage.side.avoiders[0].search.settings.window == 2.0
+    assert stage.fire.avoiders[0].search.settings.window == 2.0
     with pytest.raises(KumiteError, match="clearance"):
         controls["clearance"].set(-1.0)
     with pytest.raises(KumiteError, match="horizon"):
-        stage.tune(horizon=2.0)
-    assert stage.search.settings.window == 2.0
+        stage.fire.tune(horizon=2.0)
+    assert stage.fire.search.settings.window == 2.0
 
 
 def test_searches_under_way_keep_their_rules(avoiders: Layer):
@@ -213,11 +214,11 @@ def test_searches_under_way_keep_their_rules(avoiders: Layer):
         found = [search.search(here, [a], 0.0) for a in attacks]
         return [(f.outcome, f.path, f.part, f.counts) for f in found]
 
-    search, alone = stage.search, all_of(stage.search)
+    search, alone = stage.fire.search, all_of(stage.fire.search)
     with ThreadPoolExecutor(1) as pool:
         under_way = pool.submit(all_of, search)
         for window in np.linspace(0.1, 3.0, 200):
-            stage.tune(window=float(window), weights=(float(window), 0.0, 1.0))
+            stage.fire.tune(window=float(window), weights=(float(window), 0.0, 1.0))
         assert under_way.result() == alone
     rules = AvoidanceRules(window=0.2, clearance=0.3)
     tuned = search.tuned(window=0.2, clearance=0.3)
@@ -254,7 +255,7 @@ def test_switches_add_and_remove_volumes(avoiders: Layer):
             pytest.fail(f"only {seen} were seen")
         body = volumes._body
         assert body is not None
-        centre = body_volume(stage.cast, 0, stage.search.spheres).centre
+        centre = body_volume(stage.cast, 0, stage.fire.search.spheres).centre
         assert np.allclose(body.batched_positions, centre, atol=1e-5)
         for field in ("body", "attacks", "left"):
             setattr(volumes.shown, field, False)
@@ -269,18 +270,18 @@ def test_the_avoidance_volume_is_where_the_body_comes_by(avoiders: Layer):
     near, plan, left = [], None, None
     for _ in range(2400):
         stage.step()
-        avoider, cast = stage.side.avoiders[0], stage.cast
+        avoider, cast = stage.fire.avoiders[0], stage.cast
         if avoider.plan is None:
             continue
         if avoider.plan is not plan:
             plan, left = avoider.plan, avoidance_volume(cast, 0, avoider)
             assert len(left.radius) and left.centre[:, 1].min() > -0.1
-        begins = int(stage.search.graph.begins[avoider.plan.part])
+        begins = int(stage.fire.search.graph.begins[avoider.plan.part])
         there = cast.frame[0] + cast.fraction[0]
         if not avoider.rest and abs(there - begins) < 0.5:
             assert left is not None
             # As captured: what is shown is still being smoothed after a join.
-            place = stage.search.spheres.of_frames(avoiders.clips)[begins].T
+            place = stage.fire.search.spheres.of_frames(avoiders.clips)[begins].T
             now = planar_apply(cast.anchor[0], place)
             off = np.linalg.norm(now[:, None] - left.centre, axis=2).min(axis=0)
             near.append(float(off.max()))
@@ -397,7 +398,7 @@ def test_a_click_throws_a_ball_and_switches_show_volumes(avoiders: Layer):
         assert wait(lambda: "throw" in kinds(stage))
         event = next(e for e in stage.events if isinstance(e, Throw))
         assert np.linalg.norm(np.array(event.place) - eye) < 0.8
-        thrower, attack = stage.balls, stage.balls.attack[0]
+        thrower, attack = stage.fire.balls, stage.fire.balls.attack[0]
         assert attack is not None and thrower.thrown == 1
         gap = np.linalg.norm(attack.centre[:, 0] - chest, axis=1).min()
         assert gap < 0.3, "the ball does not come by where was clicked"
@@ -430,7 +431,7 @@ def test_a_click_throws_a_ball_and_switches_show_volumes(avoiders: Layer):
         page.get_by_role("button", name="Throw one by itself").click()
         assert wait(lambda: kinds(stage).count("throw") == 2)
         page.get_by_label("Stream", exact=True).click()
-        assert wait(lambda: stage.streams)
+        assert wait(lambda: stage.fire.streams)
         studio.toggle()
         browser.wait_until(
             page, lambda: {"avoided", "struck"} & set(kinds(stage)) != set(), "the ball's end"

@@ -229,14 +229,13 @@ def forged_recording(rng: Rng, folder: Path) -> None:
     for moment in moments(made):
         assert 0 <= moment.frame < len(made)
     stage = Playback(made)
-    log = EventLog(made.names, dodging=True, preparing=True)
-    log.show_quiet = True
+    log = EventLog(made.names, counts=("blows", "balls", "errands"))
     while stage.step():
         for event in log.update(stage.events, stage.frame):
             describe(event)
             if isinstance(event, Hit | Struck):
                 struck(event)
-        lines_html(log, stage.fps)
+        lines_html(log, stage.fps, quiet=True)
     score_html(log)
     if _looks_deep(8):
         write_glb(folder / "x.glb", made)
