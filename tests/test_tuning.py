@@ -62,9 +62,7 @@ def scene(name: str):
     return _live_scene(_settings(name, None, None), None, 2)
 
 
-@pytest.mark.parametrize(
-    "name", ["boxing", "under-fire", "sparring", "crowd", "slip", "dodgeball", "brawl", "gauntlet"]
-)
+@pytest.mark.parametrize("name", ["boxing", "under-fire", "sparring", "slip", "dodgeball", "brawl"])
 def test_all_go_to_both_bounds_and_back_while_a_scene_runs(name: str):
     stage = scene(name)
     every = stage.tunables
@@ -121,7 +119,7 @@ def test_each_kind_changes_what_happens():
             if name == "dodgeball":
                 stage.streams = True
             shown = np.zeros_like(stage.wxyz)
-            for _ in range(round(8.0 * stage.fps)):
+            for _ in range(round(5.0 * stage.fps)):
                 stage.step()
                 shown = shown + stage.wxyz
             found.append(shown.tobytes())
