@@ -119,7 +119,7 @@ def test_each_kind_changes_what_happens():
             if name == "dodgeball":
                 stage.streams = True
             shown = np.zeros_like(stage.wxyz)
-            for _ in range(round(5.0 * stage.fps)):
+            for _ in range(round(8.0 * stage.fps)):
                 stage.step()
                 shown = shown + stage.wxyz
             found.append(shown.tobytes())
