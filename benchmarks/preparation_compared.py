@@ -100,7 +100,7 @@ def fields(library: Layer, preparation: str, runs: int, seed: int) -> SceneSetti
         things.append(
             TargetSettings(
                 name=f"t{n}",
-                motion=labels[n % len(labels)],
+                kind=labels[n % len(labels)],
                 position=tuple(middle),
                 yaw_deg=np.degrees(way),
             )
@@ -187,7 +187,7 @@ def approach(library: Layer, cache_at: Path | None, way: str, runs: int, seed: i
             miss[k] = min(miss[k], float(np.linalg.norm(tip - things.home[k])))
     arrays = {k: np.array(v) for k, v in rows.items()}
     return Approaches(
-        fps=fps, label=tuple(settings.targets[k].motion for k in range(count)), kind=things.kind,
+        fps=fps, label=tuple(settings.targets[k].kind for k in range(count)), kind=things.kind,
         launch=launch, apart=apart, to_reference=to_reference, to_contact=to_contact,
         miss=np.where(np.isfinite(miss), miss, np.nan), hit=hit, passed=passed, touched=touched,
         **arrays,

@@ -625,7 +625,7 @@ def test_scenes_say_what_they_need(kumite):
     needs = {name: s["needs"] for name, s in told.items()}
     assert needs["sparring"]["level"] == "frames" and needs["boxing"]["physics"] == "if installed"
     assert needs["slip"]["level"] == "avoidance" and needs["slip"]["attackers"] == "boxing"
-    assert needs["ball-kick"]["motions"] == ["walks", "kick_ball"]
+    assert needs["ball-kick"]["motions"] == ["walks", "kick"]
 
 
 def test_all_balls_are_thrown(kumite, tmp_path: Path):

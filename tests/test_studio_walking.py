@@ -49,7 +49,11 @@ def make(targets: Layer, tmp_path_factory) -> Make:
     folder: Path = tmp_path_factory.mktemp("learned")
 
     def scene(name: str, seed: int = 1, automatic: bool = True) -> PrepareScene:
-        out = PrepareScene(load_scene(name), targets, seed=seed, cache=folder)
+        told = load_scene(name)
+        assert told.prepare is not None
+        at_home = told.prepare.model_copy(update={"scatter": 0.0, "scatter_deg": 0.0})
+        told = told.model_copy(update={"prepare": at_home})
+        out = PrepareScene(told, targets, seed=seed, cache=folder)
         out.automatic = automatic
         return out
 

@@ -13,6 +13,7 @@ from kumite.control import approach_motions, gradual
 from kumite.control.guide import Guide, learned_guide
 from kumite.graph import Layer
 from kumite.graph.hierarchy import ways_into_cores
+from kumite.graph.kinds import suited
 from kumite.graph.preparing import KINDS
 from kumite.rotation import (
     angle,
@@ -25,7 +26,7 @@ from kumite.rotation import (
 from kumite.scene import PrepareScene
 from kumite.scene.settings import SceneSettings
 from kumite.scene.settings_prepare import TargetSettings
-from kumite.scene.things import MASS_RATIO, Things
+from kumite.scene.things import MASS_RATIO, Things, fitting
 from kumite.scene.walkers import OFF, Walkers
 from tests.shared import builtin
 
@@ -200,11 +201,13 @@ def test_ways_into_cores_are_the_shortest(targets: Layer):
 def some_things(library: Layer, *settings: TargetSettings) -> Things:
     p = library.preparing
     assert p is not None
-    return Things(settings, p, p.hierarchy.targets.label)
+    found = suited(library)
+    motion = np.array([fitting(s, found)[0] for s in settings])
+    return Things(settings, p, motion)
 
 
 def test_a_ball_never_gains_energy_and_comes_to_rest(targets: Layer):
-    ball = TargetSettings(name="ball", motion="kick_ball", position=(1.0, 2.0))
+    ball = TargetSettings(name="ball", kind="kick_ball", position=(1.0, 2.0))
     rng = np.random.default_rng(3)
     for _ in range(10):
         things = some_things(targets, ball)
@@ -226,7 +229,7 @@ def test_a_ball_never_gains_energy_and_comes_to_rest(targets: Layer):
 
 
 def test_what_hangs_comes_back(targets: Layer):
-    pad = TargetSettings(name="pad", motion="punch", position=(0.0, 0.0))
+    pad = TargetSettings(name="pad", kind="punch", position=(0.0, 0.0))
     things = some_things(targets, pad)
     assert not things.lies[0]
     things.kick(0, np.array([0.0, 0.0, 3.0]))
@@ -240,7 +243,7 @@ def test_what_hangs_comes_back(targets: Layer):
 def test_things_move_alike_together_and_alone(targets: Layer):
     """Arrays of things against one at a time."""
     settings = [
-        TargetSettings(name=f"{m} {n}", motion=m, position=(3.0 * n, 0.0))
+        TargetSettings(name=f"{m} {n}", kind=m, position=(3.0 * n, 0.0))
         for n, m in enumerate(["kick_ball", "punch", "jump_over", "kick_ball", "front_kick"])
     ]
     rng = np.random.default_rng(5)
@@ -258,7 +261,7 @@ def test_things_move_alike_together_and_alone(targets: Layer):
 
 
 def test_inside_of_obstacles_by_their_corners(targets: Layer):
-    bar = TargetSettings(name="bar", motion="duck_under", position=(2, -1), yaw_deg=40, width=3.0)
+    bar = TargetSettings(name="bar", kind="duck_under", position=(2, -1), yaw_deg=40, width=3.0)
     things, rng = some_things(targets, bar), np.random.default_rng(7)
     yaw = np.radians(40)
     side, way = np.array([np.cos(yaw), -np.sin(yaw)]), np.array([np.sin(yaw), np.cos(yaw)])
@@ -270,7 +273,7 @@ def test_inside_of_obstacles_by_their_corners(targets: Layer):
 
 
 def test_gates_lead_across_obstacles_from_either_side(targets: Layer):
-    bar = TargetSettings(name="bar", motion="duck_under", position=(2, -1), yaw_deg=40, width=3.0)
+    bar = TargetSettings(name="bar", kind="duck_under", position=(2, -1), yaw_deg=40, width=3.0)
     things = some_things(targets, bar)
     yaw = np.radians(40)
     side, way = np.array([np.cos(yaw), -np.sin(yaw)]), np.array([np.sin(yaw), np.cos(yaw)])

@@ -116,6 +116,18 @@ class Preparing:
             raise KumiteError(f"preparing: a frame that is none of the {len(clips)} there are")
 
 
+def is_obstacle(preparing: Preparing, tall: float) -> np.ndarray:
+    """Which targets [T] bool get the whole body past a bar or a hurdle that is in the way of who
+    stands ``tall`` [m].
+
+    Who passes nothing has left it behind in the frame after contact; who passes takes longer.
+    """
+    p = preparing
+    under = (p.kind == KINDS.index("under")) & (p.clear < UNDER * tall)
+    over = (p.kind == KINDS.index("over")) & (p.clear > OVER * tall)
+    return (under | over) & (p.past > p.contact + 1)
+
+
 def _within(index: np.ndarray, low: int, high: int) -> bool:
     return bool(np.all((index >= low) & (index < high)))
 

@@ -18,7 +18,7 @@ class Needs:
 
     level: str  # of the library: 'kumite build --layer'
     style: str  # of the built-in performer, who stands in for a library
-    motions: tuple[str, ...]  # kinds of motion, or targets by label, that the library must hold
+    motions: tuple[str, ...]  # kinds of motion that the library must hold, or labels of its own
     attackers: str | None = None  # the library of those who attack: a style, or a file
     layers: tuple[str, ...] = ()  # all that are needed, the first of them first
     physics: str = "no"  # 'no', 'if installed' or 'yes': MuJoCo moves bodies that are struck
@@ -34,10 +34,10 @@ class Needs:
 def needs(settings: SceneSettings) -> Needs:
     """What a scene needs."""
     if settings.walking:
-        labels = {t.motion for t in settings.targets}
-        labels |= set(settings.opponents.motions if settings.opponents else ())
+        words = {t.kind for t in settings.targets}
+        words |= set(settings.opponents.motions if settings.opponents else ())
         style = (settings.prepare or PrepareSettings()).library
-        return Needs("preparation", style, ("walks", *sorted(labels)))
+        return Needs("preparation", style, ("walks", *sorted(words)))
     if settings.dodging:
         style = (settings.dodge or DodgeSettings()).library
         attackers = settings.attacker[0].library if settings.attacker else None

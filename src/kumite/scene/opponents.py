@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from kumite.control.guide import seen
+from kumite.errors import KumiteError
+from kumite.graph.kinds import MUCH_WORSE, STRIKE, Suited
 from kumite.rotation import from_yaw, planar_apply, planar_inverse, rotate
 from kumite.scene.settings_prepare import OpponentsSettings
 from kumite.scene.walkers import NOTHING, ON_THE_WAY, Walkers
@@ -15,14 +19,49 @@ REACH, RING = 0.6, 2.4  # m from a walker at which its opponent stops, and the o
 SKIN = 0.13  # m from the middle of a trunk to where it is struck
 BEHIND = 1.5  # m that an opponent behind counts as farther away than one ahead
 SETTLED = 0.5  # m that another must be nearer: nobody turns to and fro between two
+LOOSE = 0.8  # of its part of the ring about a walker in which an opponent may begin
+LOW, HIGH = 0.45, 1.0  # of the height of who stands: where a blow to a trunk or a head lands
 WATCHED = 0.15  # s over which it is seen how they move
 
 
+def blows_at(settings: OpponentsSettings, suited: Suited) -> tuple[int, ...]:
+    """The target motions that may be done to opponents: of a kind those at the height of a trunk or
+    a head, as well joined as the best nearly; a label whatever its height.
+
+    Errors: a word that is no kind and no label; a motion that is no blow; none so high.
+    """
+    found: dict[int, None] = {}
+    for word in settings.motions:
+        which = suited.meant(word, "opponents.motions")
+        wrong = [suited.label[t] for t in which.tolist() if suited.about[t] != STRIKE]
+        if wrong or word in ("under", "over"):
+            raise KumiteError(
+                f"opponents.motions {list(settings.motions)}: expected blows; "
+                f"{wrong[0] if wrong else word} is none"
+            )
+        if word in suited.label:
+            found |= dict.fromkeys(which.tolist())
+            continue
+        high = suited.high[which] / suited.tall
+        fits = which[(high >= LOW) & (high <= HIGH)]
+        if len(which) and not len(fits):
+            raise KumiteError(
+                f"opponents.motions: every {word} of this library lands below a trunk or above a "
+                f"head ({', '.join(f'{h:.2f}' for h in suited.high[which])} m); expected one at "
+                f"{LOW * suited.tall:.2f} to {HIGH * suited.tall:.2f} m"
+            )
+        good = fits[suited.apart[fits] <= suited.apart[fits].min(initial=np.inf) + MUCH_WORSE]
+        found |= dict.fromkeys(good.tolist())
+    return tuple(found)
+
+
 def closing_in(
-    settings: OpponentsSettings, middle: np.ndarray, rng: np.random.Generator
+    settings: OpponentsSettings, middle: np.ndarray, streams: Sequence[np.random.Generator]
 ) -> np.ndarray:
-    """Where opponents begin [N, 3]: in a ring about a place [2], facing it."""
-    bearing = 2 * np.pi * (np.arange(settings.count) + rng.random()) / settings.count
+    """Where opponents begin [N, 3]: in a ring about a place [2], facing it, each somewhere in its
+    part of the ring."""
+    part = np.arange(settings.count) + [LOOSE * rng.random() for rng in streams]
+    bearing = 2 * np.pi * part / settings.count
     way = np.stack([np.sin(bearing), np.cos(bearing)], axis=1)
     return np.column_stack([middle + settings.distance * way, bearing + np.pi])
 
@@ -35,12 +74,13 @@ class Opponents:
         settings: OpponentsSettings | None,
         walkers: Walkers,
         users: int,
-        motions: tuple[int, ...],
-        rng: np.random.Generator,
+        motions: Sequence[int],
+        streams: Sequence[np.random.Generator],
     ) -> None:
-        """motions: the target motions that may be done to them."""
+        """motions: the target motions that may be done to them; streams [K]: what each draws
+        from."""
         self.settings, self.walkers, self.users = settings, walkers, users
-        self.motions, self.rng, self.fps = motions, rng, walkers.fps
+        self.motions, self.streams, self.fps = motions, streams, walkers.fps
         count = len(walkers.facing)
         self.foe = np.full(count, NOBODY)  # whom each means to strike
         self.to_do = np.full(count, NOTHING)  # with what motion
@@ -67,7 +107,7 @@ class Opponents:
             if near != self.foe[k]:
                 self.foe[k] = near
                 if near != NOBODY and self.to_do[k] == NOTHING:
-                    self.to_do[k] = self.motions[int(self.rng.integers(len(self.motions)))]
+                    self.to_do[k] = self.motions[int(self.streams[k].integers(len(self.motions)))]
                 w.decide_anew(np.array([k]))
 
     def forget(self, k: int) -> None:

@@ -15,6 +15,7 @@ from kumite.control.preparation import PreparationSettings
 from kumite.control.tuning import Tunable, find
 from kumite.errors import KumiteError, unknown
 from kumite.graph import Layer, Library
+from kumite.graph.kinds import suited
 from kumite.graph.preparing import Preparing
 from kumite.kernels.blow import NO_BLOW, swept_contact
 from kumite.rotation import rotate
@@ -25,10 +26,11 @@ from kumite.scene.doors import check_scene
 from kumite.scene.events import Event, Hit, MovedGoal, Passed, Strike, Touched
 from kumite.scene.floor import TARGET_PARTS
 from kumite.scene.memory import refuse_too_many
-from kumite.scene.opponents import NOBODY, Opponents, closing_in
+from kumite.scene.opponents import NOBODY, Opponents, blows_at, closing_in
 from kumite.scene.settings_prepare import PrepareSettings
 from kumite.scene.stage import Offers, SceneObject
-from kumite.scene.things import STRIKE, Things
+from kumite.scene.starts import stream
+from kumite.scene.things import STRIKE, Things, fitting
 from kumite.scene.walkers import ARRIVED, NOTHING, ON_THE_WAY, Walkers
 from kumite.synthesis.preparation import curves
 
@@ -78,22 +80,9 @@ class PrepareScene:
         self.users = len(settings.walking)
         refuse_too_many(len(self.names), len(self.skeleton))
         self.motions = library.preparing.hierarchy.targets.label
-        targets = settings.targets
-        foes = settings.opponents
-        for label in (*(t.motion for t in targets), *(foes.motions if foes else ())):
-            if label not in self.motions:
-                raise unknown("target motion", label, self.motions)
-        for label in self.prepare.curves:
-            if label not in self.motions:
-                raise unknown("target motion of prepare.curves", label, self.motions)
-        self.things = Things(targets, library.preparing, self.motions)
-        if foes:
-            kinds = library.preparing.kind[[self.motions.index(m) for m in foes.motions]]
-            if np.any(kinds != STRIKE):
-                raise KumiteError(
-                    f"opponents.motions {list(foes.motions)}: expected blows; "
-                    f"{foes.motions[int(np.argmax(kinds != STRIKE))]} is none"
-                )
+        self.suited = suited(library)
+        self._choose_kinds()
+        self.things = Things(settings.targets, self.preparing, self._draw_motions(seed))
         for w in settings.walking:
             within = self.things.inside(np.array(w.position))
             if within is not None:
@@ -118,40 +107,65 @@ class PrepareScene:
         self.automatic = self.prepare.automatic
         self.reset(seed)
 
+    def _choose_kinds(self) -> None:
+        """The target motions that suit each thing, and those that may be done to opponents."""
+        settings, of = self.settings, self.suited
+        foes = settings.opponents
+        words = [*(t.kind for t in settings.targets), *(foes.motions if foes else ())]
+        self._fits = [fitting(t, of) for t in settings.targets]
+        self._blows = blows_at(foes, of) if foes else ()
+        of.refuse_without(words, self.title)
+        for word in self.prepare.curves:
+            of.meant(word, "prepare.curves")
+
+    def _draw_motions(self, seed: int) -> np.ndarray:
+        """What is done at each thing [N]: of a size that is told what fits it best, else one of
+        those that suit it, by the thing's own luck."""
+        out = np.zeros(len(self._fits), dtype=np.int64)
+        for n, (thing, fits) in enumerate(zip(self.settings.targets, self._fits)):
+            drawn = 0 if thing.height is not None else _thing_stream(seed, n).integers(len(fits))
+            out[n] = fits[int(drawn)]
+        return out
+
     def _curves(self) -> np.ndarray:
-        """Constants C [T, J] of the target motions."""
-        p = self.prepare
+        """Constants C [T, J] of the target motions: of all, then of their kinds, then by label."""
+        p, of = self.prepare, self.suited
         if p.preparation != "ours":
             return np.ones((len(self.motions), len(self.skeleton)))
-        return np.array(
-            [curves(self.skeleton, {**p.curve, **p.curves.get(m, {})}) for m in self.motions]
-        )
+        rows = []
+        for t, label in enumerate(self.motions):
+            told = dict(p.curve)
+            for word in (*reversed(of.kinds_of(t)), label):
+                told |= p.curves.get(word, {})
+            rows.append(curves(self.skeleton, told))
+        return np.array(rows)
 
     def reset(self, seed: int, events: list[Event] | None = None) -> None:
         """Start again from the beginning, with a seed. events: where to tell them; by default a
         list of its own."""
         self.seed, self.frame = int(seed), 0
         self.events = [] if events is None else events
-        self.rng = np.random.default_rng(self.seed)
-        self.things.reset()
+        self.things = Things(self.settings.targets, self.preparing, self._draw_motions(self.seed))
         walking, foes = self.settings.walking, self.settings.opponents
+        streams = [stream(self.seed, k) for k in range(len(self.names))]
         homes = [[*w.position, np.radians(w.yaw_deg)] for w in walking]
         if foes:
             middle = np.mean([w.position for w in walking], axis=0)
-            homes += closing_in(foes, middle, self.rng).tolist()
+            homes += closing_in(foes, middle, streams[self.users :]).tolist()
+        homes = [self._scattered(home, rng) for home, rng in zip(homes, streams)]
         self.walkers = Walkers(
             self.guide,
             self.names,
             np.array(homes),
             self.events.append,
+            streams,
             preparation=self.prepare.preparation,
             curve=self.curve,
         )
         count = len(homes)
         self.thing = np.full(count, NO_THING)  # what each goes to
         self.pushed = np.zeros((count, 2))  # m by which others have carried each away
-        blows = tuple(self.motions.index(m) for m in foes.motions) if foes else ()
-        self.opponents = Opponents(foes, self.walkers, self.users, blows, self.rng)
+        self.opponents = Opponents(foes, self.walkers, self.users, self._blows, streams)
         self.told = np.full((count, 2), np.nan)  # m: or where, by hand
         self._nearest = np.full(count, np.inf)  # m that it has come to there …
         self._nearer_at = np.zeros(count, dtype=np.int64)  # … in this frame
@@ -166,6 +180,15 @@ class PrepareScene:
         self._course = [
             [self.things.names.index(n) for n in w.goes_to] for w in self.settings.walking
         ]
+
+    def _scattered(self, home: list[float], rng: np.random.Generator) -> np.ndarray:
+        """A facing frame [3] off ``home`` as far as the scene lets chance take it, never into an
+        obstacle."""
+        p = self.prepare
+        spread = np.array([p.scatter, p.scatter, np.radians(p.scatter_deg)])
+        off = rng.uniform(-1.0, 1.0, 3) * spread
+        place = np.array(home) + off
+        return np.array(home) if self.things.inside(place[:2]) is not None else place
 
     @property
     def cast(self):
@@ -290,15 +313,17 @@ class PrepareScene:
         self.walkers.decide_anew(np.array([k]))
 
     def trigger(self, k: int, motion: str) -> bool:
-        """Let walker k do a target motion now; False while it does another. It is bent to meet what
-        is at hand for it, if anything is. Errors: there is none of that name.
+        """Let walker k do a target motion now, by its label, or one of a kind: that which it
+        prepares for, else the best of it; False while it does another. It is bent to meet what is
+        at hand for it, if anything is. Errors: there is none of that name or kind.
         """
-        if motion not in self.motions:
-            raise unknown("target motion", motion, self.motions)
+        which = self.suited.meant(motion, "trigger")
+        self.suited.refuse_without([motion], self.title)
         if self.walkers.doing[k] != ON_THE_WAY:
             return False
-        t = self.motions.index(motion)
-        fits = self.walkers.wants[k] == t and self._aimed(k)
+        wants = int(self.walkers.wants[k])
+        t = wants if wants in which else int(which[0])
+        fits = wants == t and self._aimed(k)
         self._launch(k, t, bend=fits)
         return True
 
@@ -595,6 +620,11 @@ class PrepareScene:
                 blow=thrown.blow,
             )
         )
+
+
+def _thing_stream(seed: int, n: int) -> np.random.Generator:
+    """What thing n draws from: none of the characters' streams."""
+    return np.random.default_rng([seed, n, 1])
 
 
 def blows_of(library: Layer) -> np.ndarray:

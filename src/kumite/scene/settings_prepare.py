@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
 from kumite.scene.settings_base import Finite, Metres, Name, Settings
+
+
+def _motion_is_kind(given: Any) -> Any:
+    """What is done at a thing was called its motion."""
+    if isinstance(given, dict) and "motion" in given:
+        if "kind" in given:
+            raise ValueError("kind and motion say the same; expected one of them (kind)")
+        return {("kind" if key == "motion" else key): value for key, value in given.items()}
+    return given
+
 
 Curve = dict[str, Annotated[Finite, Field(gt=0)]]  # C by joint, role or group
 WIDEST = 20.0  # m
@@ -26,7 +36,9 @@ class WalkersSettings(Settings):
 
     count: Annotated[int, Field(ge=1, le=10_000)] = 9
     spacing: Annotated[Finite, Field(ge=2.0, le=50.0)] = 6.0  # m
-    motion: Name = "kick_ball"
+    kind: Name = "kick"  # of what is done there, or a label
+
+    _old = model_validator(mode="before")(_motion_is_kind)
 
     def walkers(self) -> tuple[WalkerSettings, ...]:
         return tuple(
@@ -37,7 +49,7 @@ class WalkersSettings(Settings):
     def targets(self) -> tuple[TargetSettings, ...]:
         return tuple(
             TargetSettings(
-                name=f"thing {n + 1}", motion=self.motion, position=(x, z + 0.5 * self.spacing)
+                name=f"thing {n + 1}", kind=self.kind, position=(x, z + 0.5 * self.spacing)
             )
             for n, (x, z) in enumerate(self._places())
         )
@@ -58,12 +70,15 @@ class TargetSettings(Settings):
     """A thing at which a target motion is done: a ball to kick, a bar to get under, a hurdle."""
 
     name: Name
-    motion: Name  # a target motion of the library
+    kind: Name  # what is done there: under, over, kick, punch or strike; or a label of the library
     position: tuple[Metres, Metres]  # m, x and z of its middle
     yaw_deg: Finite = 0.0  # the way through an obstacle, or the way back
     width: Annotated[Finite, Field(ge=0.8, le=WIDEST)] = 2.4  # m, of an obstacle
-    height: Annotated[Finite, Field(gt=0, le=5)] | None = None  # m; by default as the motion needs
+    # m: of a bar's underside, a hurdle's top, a ball's middle; None: as the motion needs.
+    height: Annotated[Finite, Field(gt=0, le=5)] | None = None
     radius: Annotated[Finite, Field(ge=0.02, le=0.5)] = 0.11  # m, of a ball
+
+    _old = model_validator(mode="before")(_motion_is_kind)
 
 
 class OpponentsSettings(Settings):
@@ -71,7 +86,7 @@ class OpponentsSettings(Settings):
 
     count: Annotated[int, Field(ge=1, le=200)] = 3
     distance: Annotated[Finite, Field(ge=2, le=50)] = 5.0  # m at which they begin
-    motions: tuple[Name, ...] = ("punch",)  # what is done when one is in reach
+    motions: tuple[Name, ...] = ("punch",)  # kinds or labels: what is done when one is in reach
     rest: Annotated[Finite, Field(ge=0, le=60)] = 4.0  # s that who was struck keeps away
 
 
@@ -83,7 +98,9 @@ class PrepareSettings(Settings):
     automatic: bool = True  # goes, and launches what is to be done, by itself
     gaits: tuple[Name, ...] = ()  # cores to go with; none: walks of any kind
     curve: Curve = Field(default_factory=dict)  # C by joint, role, "legs" or "upper"
-    curves: dict[Name, Curve] = Field(default_factory=dict)  # the same, of target motions by label
+    curves: dict[Name, Curve] = Field(default_factory=dict)  # the same, by kind or label of targets
+    scatter: Annotated[Finite, Field(ge=0, le=5)] = 0.0  # m off its place that one begins, at most
+    scatter_deg: Annotated[Finite, Field(ge=0, le=180)] = 0.0  # and off its heading
 
     @model_validator(mode="after")
     def _curves_count(self) -> PrepareSettings:

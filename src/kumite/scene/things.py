@@ -7,6 +7,7 @@ import numpy as np
 from kumite.body import Body
 from kumite.control.rules import GRAVITY
 from kumite.errors import KumiteError
+from kumite.graph.kinds import LYING, Suited
 from kumite.graph.preparing import KINDS, Preparing
 from kumite.scene.balls import BOUNCE, REST, ROLLING
 from kumite.scene.doors import a_place
@@ -23,37 +24,57 @@ AT_REST = 0.15  # m/s: a ball that is slower lies
 SAMPLES = np.linspace(0.0, 1.0, 5)  # of a capsule, where it is tried against an obstacle
 
 
+def fitting(settings: TargetSettings, suited: Suited) -> np.ndarray:
+    """The target motions [N] that suit a thing, the best first.
+
+    Errors: a word that is no kind and no label; a size that none of them clears or strikes at.
+    """
+    s = settings
+    which = suited.meant(s.kind, f"kind of {s.name}")
+    for t in which.tolist():
+        if suited.about[t] != STRIKE and not suited.kinds_of(t):
+            raise KumiteError(
+                f"kind of {s.name}: {suited.label[t]} gets lower or higher where it stands, past "
+                "nothing; expected a motion that gets past a bar or a hurdle"
+            )
+    found = suited.fit(which, s.height, s.radius)
+    if len(which) and not len(found) and s.height is not None:
+        t = int(which[np.argmax(suited.spare(which, s.height))])
+        does = ("strikes at", "passes under", "clears")[suited.about[t]]
+        high = (suited.high if suited.about[t] == STRIKE else suited.clear)[t]
+        raise KumiteError(
+            f"height of {s.name}: {s.height:g} m, but {suited.label[t]} {does} {high:.2f} m, the "
+            "nearest that this library has; expected that, or no height"
+        )
+    return found
+
+
 class Things:
     """N things, as arrays."""
 
     def __init__(
-        self, settings: tuple[TargetSettings, ...], preparing: Preparing, labels: tuple[str, ...]
+        self, settings: tuple[TargetSettings, ...], preparing: Preparing, motion: np.ndarray
     ) -> None:
-        """Errors: motions that the library does not have; obstacles that no motion clears."""
+        """motion [N]: the target motion that is done at each, see :func:`fitting`."""
         self.settings = settings
         self.names = tuple(s.name for s in settings)
-        self.motion = np.array([labels.index(s.motion) for s in settings], dtype=np.int64)
-        self.kind = preparing.kind[self.motion].astype(np.int64)
+        self.motion = motion
+        self.kind = preparing.kind[motion].astype(np.int64)
         self.yaw = np.radians([s.yaw_deg for s in settings])
         self.width = np.array([s.width for s in settings])
         self.radius = np.array([s.radius for s in settings])
         self.height = np.zeros(len(settings))
         for n, s in enumerate(settings):
-            kind, clear = int(self.kind[n]), float(preparing.clear[self.motion[n]])
-            if kind == STRIKE:
-                continue
-            self.height[n] = clear + SPARE[kind] if s.height is None else s.height
-            wrong = self.height[n] < clear if kind == UNDER else self.height[n] > clear
-            if wrong:
-                how = "passes under" if kind == UNDER else "clears"
-                raise KumiteError(
-                    f"height of {s.name}: {self.height[n]:g} m, but {s.motion} {how} {clear:.2f} m"
-                )
+            kind, clear = int(self.kind[n]), float(preparing.clear[motion[n]])
+            if kind != STRIKE:
+                self.height[n] = clear + SPARE[kind] if s.height is None else s.height
         self.home = np.array([[s.position[0], 0.0, s.position[1]] for s in settings]).reshape(-1, 3)
         strikes = self.kind == STRIKE
         high = preparing.place[self.motion][:, 1]
         # A low blow is at a ball that lies, a high one at one that hangs there.
-        self.lies = strikes & (high < 0.35)
+        told = [s.height is not None for s in settings]
+        high = np.where(told, [s.height or 0.0 for s in settings], high)
+        self.lies = strikes & (high < np.where(told, 2.0 * self.radius, LYING))
         self.home[:, 1] = np.where(strikes, np.where(self.lies, self.radius, high), 0.0)
         self.reset()
 

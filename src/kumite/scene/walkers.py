@@ -25,6 +25,7 @@ from kumite.rotation import (
     wrap_angle,
 )
 from kumite.scene.events import Decision, Done, Event, Launch
+from kumite.scene.starts import draw_starts
 from kumite.synthesis import Cast, LevelFilter, Moment, Preparation, References, references
 from kumite.synthesis.preparation import blended
 
@@ -61,12 +62,14 @@ class Walkers:
         names: Sequence[str],
         homes: np.ndarray,
         tell: Callable[[Event], None],
+        streams: Sequence[np.random.Generator] = (),
         *,
         preparation: str = "ours",
         curve: np.ndarray | None = None,
     ) -> None:
         """names [K]; homes [K, 3]: facing frames to begin at. curve: C, [J] or [T, J] of each
-        target. tell: is told of decisions, and of motions begun and done.
+        target. tell: is told of decisions, and of motions begun and done. streams [K]: what each
+        draws its start from; none: all begin in one pose.
         """
         library = guide.library
         preparing = library.preparing
@@ -121,9 +124,8 @@ class Walkers:
         out = np.searchsorted(states, links.link_leave[self._stand])
         self._leave_stand = np.where(links.links[self._stand], out, NOTHING)
         self._cycle = np.maximum(1, np.round(cores.seconds * self.fps).astype(np.int64))
-        begins = int(np.searchsorted(states, cores.stop[self._stand]))
-        for k, home in enumerate(homes):
-            self.cast.place(k, begins, home)
+        for k, (stretch, frame) in enumerate(zip(*self._starts(streams, count))):
+            self.cast.place(k, int(library.table.target[stretch]), homes[k], frame=int(frame))
         self.cast.show(0.0)
         for k, home in enumerate(homes):
             self.shown.place(k, self.cast.facing[k], home)
@@ -134,6 +136,19 @@ class Walkers:
         # Joints and their world rotations a frame ago.
         self.shown_before = (self.shown.position.copy(), self.shown.world_wxyz.copy())
         self._settled[:] = False
+
+    def _starts(
+        self, streams: Sequence[np.random.Generator], count: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The stretch [K] and the frame [K] in which all begin: they stand, and who would do so in
+        step with another goes."""
+        table, what = self.library.table, self.preparing.what
+        stand = np.flatnonzero(what == self._stand)
+        if not streams:
+            last = stand[np.argmax(table.last[stand])]
+            return np.full(count, last), np.full(count, table.last[last])
+        goes = np.flatnonzero(np.isin(what, np.flatnonzero(self._goes)))
+        return draw_starts(self.library, stand, streams, otherwise=goes)
 
     @property
     def facing(self) -> np.ndarray:

@@ -39,6 +39,7 @@ class Targets:
         otherwise, takes all clicks on them and round about.
         """
         self._objects = tuple(o.name for o in objects)
+        self._sizes = [o.size for o in objects]
         self._shown = [
             _add_parts(server, f"{STAGE}/object/{i}", o, parts)
             if (parts := shown(o))
@@ -54,6 +55,14 @@ class Targets:
                 self._gizmos[i] = self._add_gizmo(server, i, o, moved)
             elif o.draggable and dragged is not None:
                 self._let_drag(i, o.name, dragged)
+
+    def renew(self, server: viser.ViserServer, objects: Sequence[SceneObject]) -> None:
+        """Draw what has another size since a restart: obstacles are as the seed has them."""
+        for i, (o, size) in enumerate(zip(objects, self._sizes)):
+            if o.size != size and (parts := shown(o)):
+                self._shown[i].remove()
+                self._shown[i] = _add_parts(server, f"{STAGE}/object/{i}", o, parts)
+        self._sizes = [o.size for o in objects]
 
     def _let_drag(
         self, index: int, name: str, dragged: Callable[[int, str, np.ndarray, np.ndarray], None]

@@ -212,6 +212,7 @@ class Studio:
         seed = self.stage.seed if seed is None else a_seed(seed)
         with self._lock:
             self.stage.reset(seed)
+            self._targets.renew(self.server, self.stage.objects)
             self._after_jump()
             self._rewound = True
         self.wake()

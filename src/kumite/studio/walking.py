@@ -53,8 +53,8 @@ class Walking:
         self._walk = gui.add_folder("Walk")
         with self._walk:
             gui.add_html(
-                '<div style="padding:0 1em .5em;font-size:.85em;opacity:.75">click on the floor or '
-                f"on a thing; arrow keys or I J K L{KEYS_ARE_OURS}</div>"
+                '<div style="padding:0 1em .5em;font-size:.85em;opacity:.75">click the floor or '
+                f"a thing; arrows or I J K L{KEYS_ARE_OURS}</div>"
             )
             ways = gui.add_button_group("", tuple(KEYS), hint="a few steps, as seen from here")
             ways.on_click(safely(lambda e: self._press(e, e.target.value)))
