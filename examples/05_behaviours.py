@@ -24,7 +24,8 @@ behaviours = {
     ),
 }
 scene = World(load_scene("target"), builtin_layer(None), behaviours=behaviours)
-weights = {tunable.field: tunable for tunable in scene.tunables}
+kinds = ("approach", "strike", *behaviours)
+weights = {t.field: t for t in scene.tunables if t.field in kinds}
 target = scene.objects[0].position
 
 
