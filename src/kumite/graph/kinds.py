@@ -119,7 +119,9 @@ def suited(layer: Layer) -> Suited:
         raise KumiteError("the library is not one for preparation; expected --layer preparation")
     tall = _tall(layer.clips, p)
     real = is_obstacle(p, tall)
-    strike = p.kind == STRIKE
+    hips = layer.clips.world[0][:, layer.clips.skeleton.joint("pelvis"), 1]
+    # In a roll feet fly about, too.
+    strike = (p.kind == STRIKE) & (hips[p.contact] >= LOW_HIPS * tall)
     kick = strike & np.isin(p.limb, FEET)
     is_of = {
         "under": real & (p.kind == ABOUT.index("under")),
@@ -141,7 +143,7 @@ def suited(layer: Layer) -> Suited:
         p.clear,
         p.place[:, 1],
         tall,
-        int(np.count_nonzero(~strike & ~real)),
+        int(np.count_nonzero((p.kind != STRIKE) & ~real)),
     )
 
 
