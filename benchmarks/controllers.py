@@ -56,8 +56,8 @@ def settings_of(name: str, controllers: tuple[str, ...], by: str | None) -> Scen
         out["character"].append(blue)
     if prepares:
         out["target"] = [
-            {"name": "bar", "motion": "under", "position": (0.0, -1.0)},
-            {"name": "other bar", "motion": "under", "position": (0.0, 3.0)},
+            {"name": "bar", "kind": "under", "position": (0.0, -1.0)},
+            {"name": "other bar", "kind": "under", "position": (0.0, 3.0)},
         ]
     if avoids:
         out["balls"] = {"throws": 10_000, "every": 4.0}

@@ -626,6 +626,7 @@ def test_scenes_say_what_they_need(kumite):
     assert needs["sparring"]["level"] == "frames" and needs["boxing"]["physics"] == "if installed"
     assert needs["slip"]["level"] == "avoidance" and needs["slip"]["attackers"] == "boxing"
     assert needs["ball-kick"]["motions"] == ["walks", "kick"]
+    assert needs["gauntlet"]["motions"][-2:] == ["walks", "under"]
 
 
 def test_all_balls_are_thrown(kumite, tmp_path: Path):

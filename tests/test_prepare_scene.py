@@ -20,8 +20,8 @@ from kumite.scene.walkers import NOTHING, OFF, ON_THE_WAY, STEEPEST
 from tests.shared import builtin
 
 TARGETS = [
-    {"name": "ball", "motion": "kick_ball", "position": (0.5, 3.0)},
-    {"name": "bar", "motion": "duck_under", "position": (4.0, 0.0), "yaw_deg": 90.0},
+    {"name": "ball", "kind": "kick", "position": (0.5, 3.0)},
+    {"name": "bar", "kind": "duck_under", "position": (4.0, 0.0), "yaw_deg": 90.0},
 ]
 
 
@@ -101,7 +101,7 @@ def test_who_prepares_begins_nearer_to_the_posture(targets: Layer, learned: Path
 def _between_beams(targets: Layer, learned: Path, apart: float) -> tuple[float, float]:
     """Mean level and least height of the pelvis between two crawls, the beams so far apart [m]."""
     beams = [
-        {"name": f"beam {n}", "motion": "crawl_under", "position": (0.0, 3.0 + n * apart)}
+        {"name": f"beam {n}", "kind": "crawl_under", "position": (0.0, 3.0 + n * apart)}
         for n in range(2)
     ]
     walker = {"name": "anna", "position": (0.0, -1.0), "goes_to": ("beam 0", "beam 1")}
@@ -134,7 +134,7 @@ def test_who_has_passed_an_obstacle_turns_round_and_comes_back(
 ):
     """Three alone with an obstacle each: nobody lingers before it, nobody touches it."""
     motions = ("duck_under", "crawl_under", "jump_over")
-    things = [{"name": m, "motion": m, "position": (30.0 * n, 3.0)} for n, m in enumerate(motions)]
+    things = [{"name": m, "kind": m, "position": (30.0 * n, 3.0)} for n, m in enumerate(motions)]
     walkers = [
         {"name": f"to {m}", "position": (30.0 * n, -1.0), "goes_to": (m,)}
         for n, m in enumerate(motions)
@@ -184,8 +184,8 @@ def test_what_somebody_makes_for_is_told_by_its_heading(
     targets: Layer, learned: Path, made_for: int
 ):
     aside = [
-        {"name": "ball", "motion": "kick_ball", "position": (1.5, 3.0)},
-        {"name": "pad", "motion": "punch", "position": (-1.5, 3.0)},
+        {"name": "ball", "kind": "kick", "position": (1.5, 3.0)},
+        {"name": "pad", "kind": "punch", "position": (-1.5, 3.0)},
     ]
     scene = scene_of(targets, learned, target=aside, prepare={"automatic": False})
     w = scene.walkers

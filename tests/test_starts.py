@@ -7,7 +7,7 @@ import pytest
 
 from kumite.cli.ahead import Wanted
 from kumite.cli.scenes import live_scene
-from kumite.graph import Layer
+from kumite.graph import Layer, kinds
 from kumite.graph.kinds import suited
 from kumite.scene import catalogue, load_scene, record
 from kumite.scene.starts import draw_starts, stream
@@ -67,3 +67,13 @@ def test_kinds_are_what_was_found(targets: Layer):
     assert len(found.fit(under, low - 0.01, 0.0)) == 0
     assert [found.label[t] for t in found.fit(found.of["kick"], None, 0.1)] == ["kick_ball"]
     assert found.label[found.fit(found.of["kick"], 0.8, 0.1)[0]] == "front_kick"
+
+
+def test_who_lies_down_is_taken_only_at_need(targets: Layer, monkeypatch: pytest.MonkeyPatch):
+    assert len(suited(targets).fit(suited(targets).of["under"], None, 0.0)) == 2
+    monkeypatch.setattr(kinds, "LOW_HIPS", 0.35)  # as if who crawls lay, and who ducks did not
+    found = suited(targets)
+    under = found.of["under"]
+    assert [found.label[t] for t in found.fit(under, None, 0.0)] == ["duck_under"]
+    lowest = found.fit(under, found.clear[under].min() + 0.01, 0.0)
+    assert [found.label[t] for t in lowest] == ["crawl_under"]

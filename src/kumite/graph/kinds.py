@@ -31,6 +31,8 @@ KINDS = tuple(TAKES)
 STRIKE = ABOUT.index("strike")
 FEET = [LIMBS.index(limb) for limb in LIMBS if limb.endswith("foot")]
 UNSTEADY = 0.6  # rad that a motion without a reference posture counts as less well joined
+LOW_HIPS = 0.2  # of the height of who stands: whose pelvis gets lower lies, or sits …
+LIES = 1.0  # … rad that such a motion counts as less well joined: it is taken only at need
 LYING = 0.35  # m: what is struck below it lies on the ground, else it hangs there
 MUCH_WORSE = 0.8  # rad: who is so much less well joined than the best is taken only at need
 
@@ -42,7 +44,9 @@ class Suited:
     label: tuple[str, ...]  # T
     about: np.ndarray  # [T] as Preparing.kind
     of: dict[str, np.ndarray]  # by kind: numbers of targets, the best joined first
-    apart: np.ndarray  # [T] rad of its best ways in and out together, more where it is unsteady
+    apart: (
+        np.ndarray
+    )  # [T] rad of its best ways in and out together, more where it is unsteady or lies
     clear: np.ndarray  # [T] m: see Preparing
     high: np.ndarray  # [T] m above ground at which a strike hits
     tall: float  # m, height of who stands
@@ -115,7 +119,9 @@ def suited(layer: Layer) -> Suited:
         raise KumiteError("the library is not one for preparation; expected --layer preparation")
     tall = _tall(layer.clips, p)
     real = is_obstacle(p, tall)
-    strike = p.kind == STRIKE
+    hips = layer.clips.world[0][:, layer.clips.skeleton.joint("pelvis"), 1]
+    # In a roll feet fly about, too.
+    strike = (p.kind == STRIKE) & (hips[p.contact] >= LOW_HIPS * tall)
     kick = strike & np.isin(p.limb, FEET)
     is_of = {
         "under": real & (p.kind == ABOUT.index("under")),
@@ -127,6 +133,7 @@ def suited(layer: Layer) -> Suited:
     h = p.hierarchy
     apart = h.entry_distance.min(axis=0) + h.exit_distance.min(axis=0)
     apart = apart + np.where(p.found, 0.0, UNSTEADY)
+    apart = apart + np.where(_lowest_hips(layer.clips, p) < LOW_HIPS * tall, LIES, 0.0)
     order = np.argsort(apart, kind="stable")
     return Suited(
         h.targets.label,
@@ -136,8 +143,15 @@ def suited(layer: Layer) -> Suited:
         p.clear,
         p.place[:, 1],
         tall,
-        int(np.count_nonzero(~strike & ~real)),
+        int(np.count_nonzero((p.kind != STRIKE) & ~real)),
     )
+
+
+def _lowest_hips(clips: ClipSet, p: Preparing) -> np.ndarray:
+    """How low [T] m the pelvis gets in each target."""
+    high = clips.world[0][:, clips.skeleton.joint("pelvis"), 1]
+    of = p.hierarchy.targets
+    return np.array([high[a : b + 1].min() for a, b in zip(of.start, of.stop)])
 
 
 def _tall(clips: ClipSet, p: Preparing) -> float:

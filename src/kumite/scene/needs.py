@@ -34,10 +34,8 @@ class Needs:
 def needs(settings: SceneSettings) -> Needs:
     """What a scene needs."""
     if settings.walking:
-        words = {t.kind for t in settings.targets}
-        words |= set(settings.opponents.motions if settings.opponents else ())
         style = (settings.prepare or PrepareSettings()).library
-        return Needs("preparation", style, ("walks", *sorted(words)))
+        return Needs("preparation", style, _prepared_for(settings))
     if settings.dodging:
         style = (settings.dodge or DodgeSettings()).library
         attackers = settings.attacker[0].library if settings.attacker else None
@@ -51,10 +49,19 @@ def needs(settings: SceneSettings) -> Needs:
     if level == "actions" and not still:
         motions = (*motions, "defences")
     motions = (*motions, *(m for m, who in (("avoidance", settings.avoiding),) if who))
+    if settings.preparing:
+        motions = (*motions, *_prepared_for(settings))
     physics = {"kinematic": "no", "auto": "if installed", "physical": "yes"}[bout.reactions]
     physics = physics if level == "actions" else "no"
     style = bout.library if len(layers) == 1 or bout.library != "boxing" else "all"
     return Needs(level, style, motions, layers=layers, physics=physics)
+
+
+def _prepared_for(settings: SceneSettings) -> tuple[str, ...]:
+    """Walks, and the kinds of what is done at the end of them."""
+    words = {t.kind for t in settings.targets}
+    words |= set(settings.opponents.motions if settings.opponents else ())
+    return "walks", *sorted(words)
 
 
 def wanted_layers(settings: SceneSettings, has: Collection[str] = ("frames",)) -> tuple[str, ...]:

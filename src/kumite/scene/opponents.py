@@ -8,7 +8,7 @@ import numpy as np
 
 from kumite.control.guide import seen
 from kumite.errors import KumiteError
-from kumite.graph.kinds import MUCH_WORSE, STRIKE, Suited
+from kumite.graph.kinds import MUCH_WORSE, STRIKE, TAKES, Suited
 from kumite.rotation import from_yaw, planar_apply, planar_inverse, rotate
 from kumite.scene.settings_prepare import OpponentsSettings
 from kumite.scene.walkers import NOTHING, ON_THE_WAY, Walkers
@@ -48,7 +48,7 @@ def blows_at(settings: OpponentsSettings, suited: Suited) -> tuple[int, ...]:
             raise KumiteError(
                 f"opponents.motions: every {word} of this library lands below a trunk or above a "
                 f"head ({', '.join(f'{h:.2f}' for h in suited.high[which])} m); expected one at "
-                f"{LOW * suited.tall:.2f} to {HIGH * suited.tall:.2f} m"
+                f"{LOW * suited.tall:.2f} to {HIGH * suited.tall:.2f} m: {TAKES[word]}"
             )
         good = fits[suited.apart[fits] <= suited.apart[fits].min(initial=np.inf) + MUCH_WORSE]
         found |= dict.fromkeys(good.tolist())
