@@ -416,7 +416,7 @@ def timings(throws: int) -> str:
     rules = DodgeSettings().search()
     for name in graphs():
         asked = anywhere(name, max(throws // 2, 4 * FEW_THROWS))
-        search, base = scene_of(name).fire.search, np.nan
+        search, base = AvoidanceSearch(library(name), replace(rules, index=True)), np.nan
         known = [a for a in asked if search.search(*a).indexed][:100]
         for index, culling in PAPER:
             search = AvoidanceSearch(library(name), replace(rules, index=index, culling=culling))
@@ -435,7 +435,7 @@ def timings(throws: int) -> str:
             )  # fmt: skip
 
         def build(name=name, rules=rules) -> AvoidanceSearch:
-            search = AvoidanceSearch(library(name), rules)
+            search = AvoidanceSearch(library(name), replace(rules, index=True))
             _ = search.index
             return search
 

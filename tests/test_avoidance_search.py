@@ -29,7 +29,18 @@ COUNTS = {kernels.VALID: "valid", kernels.STIFF: "stiff", kernels.TOO_FAST: "too
 
 @cache
 def searching(**rules) -> AvoidanceSearch:
-    return AvoidanceSearch(few(), AvoidanceRules(**rules))
+    return AvoidanceSearch(few(), AvoidanceRules(**{"index": True, **rules}))
+
+
+def test_a_small_graph_is_not_indexed():
+    """Trying all of its paths is quicker; what is found is the same."""
+    by_itself, asked = AvoidanceSearch(few()), searching()
+    assert not by_itself.indexes and by_itself.index_bytes < 1000 < asked.index_bytes
+    for seed in range(8):
+        standing, coming, now = case(seed)
+        found, known = (s.search(standing, coming, now) for s in (by_itself, asked))
+        assert (found.outcome, found.path, found.part) == (known.outcome, known.path, known.part)
+        assert not found.indexed
 
 
 def case(seed: int, attacks: int = 1, radius: tuple[float, float] = (0.03, 0.12)):

@@ -67,11 +67,13 @@ def _dodging() -> Any:
     """A search, and throws at who is at the beginning of a stretch."""
     from kumite.control.attack import thrown
     from kumite.control.avoidance import AvoidanceSearch, Standing
+    from kumite.control.rules import AvoidanceRules
     from kumite.scene.balls import aimed
     from kumite.scene.settings_dodge import BallsSettings
 
     library = sixteen()
-    search, rng, asked = AvoidanceSearch(library), np.random.default_rng(20110), []
+    search = AvoidanceSearch(library, AvoidanceRules(index=True))
+    rng, asked = np.random.default_rng(20110), []
     table, facing = library.table, library.clips.facing
     for stretch in rng.choice(len(table.first), THROWS):
         frame = int(table.first[stretch])
@@ -98,9 +100,10 @@ def _avoiding(best: Best, indexed: bool) -> float:
 
 def _index(best: Best) -> float:
     from kumite.control.avoidance import AvoidanceSearch
+    from kumite.control.rules import AvoidanceRules
 
     library = _dodging()[0].library
-    return best(lambda: AvoidanceSearch(library).index)
+    return best(lambda: AvoidanceSearch(library, AvoidanceRules(index=True)).index)
 
 
 def _index_megabytes() -> float:

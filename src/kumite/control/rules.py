@@ -135,7 +135,7 @@ class AvoidanceRules:
     ahead: float = 2.0  # s before an attack's middle from which avoiding it is thought about
     horizon: float = 1.5  # s to which the index looks ahead
     joins: bool = True  # whether what joins leave is reckoned with
-    index: bool = True
+    index: bool | None = None  # None: where the graph is so large that looking up pays
     culling: bool = True
 
     def __post_init__(self) -> None:

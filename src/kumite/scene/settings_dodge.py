@@ -59,7 +59,7 @@ class DodgeSettings(Settings):
     clearance: Annotated[Finite, Field(ge=0, le=1)] = 0.02  # m
     most: Annotated[Finite, Field(ge=1, le=FASTEST)] = 4.0
     spheres: str | None = None  # a file of the body's volume (kumite spheres); by default laid
-    index: bool = True
+    index: bool | None = None  # by default where the graph is so large that looking up pays
     culling: bool = True
     searches: bool = True  # False: they only stand about
     counters: bool = True  # where a blow has been avoided, they strike back, if they have blows
