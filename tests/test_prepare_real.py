@@ -59,7 +59,7 @@ def test_real_clips_pass_under_and_over(woody: Layer, tmp_path: Path):
         positions.append(scene.walkers.shown.position[0].copy())
     assert np.all(np.isfinite(positions))
     launches = [e for e in scene.events if isinstance(e, Launch)]
-    assert {d.motion for d in launches} == {under, over}
+    assert {kinds[d.motion] for d in launches} == {"under", "over"}
     assert all(d.bent is not None and d.bent <= OFF for d in launches)
     passed = [e.clearance for e in scene.events if isinstance(e, Passed)]
     assert len(passed) >= 2 and min(passed) > 0

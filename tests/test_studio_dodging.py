@@ -418,6 +418,7 @@ def test_a_click_throws_a_ball_and_switches_show_volumes(avoiders: Layer):
 
         volumes = viewer_of(studio).own.volumes
         assert volumes is not None
+        page.get_by_text("Volumes", exact=True).click()
         for label, field in (
             ("Body volume", "body"),
             ("Attack volume", "attacks"),

@@ -49,7 +49,6 @@ def junk(random: Random, depth: int = 2) -> Any:
 
 def nearly(random: Random, studio: Studio) -> Any:
     """A message that a page may send, with something in it changed."""
-    studio.look_in(studio.server)
     handles = [*studio.server.gui._gui_input_handle_from_uuid.values()]
     handle = random.choice(handles)
     message: dict[str, Any] = dict(
@@ -105,6 +104,7 @@ def studio() -> Iterator[Studio]:
 
 def test_no_message_ends_or_spoils_the_studio(studio: Studio, capfd: pytest.CaptureFixture[str]):
     random = Random(15)
+    studio.look_in(studio.server)
     controls = dict(studio.server.gui._gui_input_handle_from_uuid)
     nodes = set(studio.server.scene._handle_from_node_name)
     for _ in range(COUNT):
