@@ -198,10 +198,11 @@ class Panel:
 
     def playing(self, playing: bool, speed: float, seed: int) -> None:
         """Label the button for what it does next; other pages may have set the speed and seed."""
-        if self._speed.value != speed:
-            self._speed.value = speed
-        if self._seed is not None and self._seed.value != seed:
-            self._seed.value = seed
+        # Only what has changed: what a hand has just moved is not taken back before it is heard.
+        if self._shown.get("speed") != speed:
+            self._shown["speed"] = self._speed.value = speed
+        if self._seed is not None and self._shown.get("seed") != seed:
+            self._shown["seed"] = self._seed.value = seed
         if self._shown.get("playing") != playing:
             self._shown["playing"] = playing
             self._play.label = "Pause" if playing else "Play"
