@@ -19,48 +19,6 @@ TRUE = 0.10  # m from a body as it stands: a ball that passes no farther off was
 NEAR = 2.0  # m from a character: so near a ball menaces it, whoever it is thrown at
 
 
-class ByHand:
-    """What of a scene's throwing can be done by hand. Follows :class:`Throwable`."""
-
-    def __init__(self, throwing: Callable[[], Throwing], frame: Callable[[], int]) -> None:
-        """throwing: as it is now: a scene that begins again has another."""
-        self._throwing, self._frame = throwing, frame
-
-    @property
-    def thrown_at(self) -> tuple[int, ...]:
-        return tuple(self._throwing().at)
-
-    @property
-    def ball_radius(self) -> float:
-        return float(self._throwing().settings.radius)
-
-    @property
-    def streams(self) -> bool:
-        return self._throwing().streams
-
-    @streams.setter
-    def streams(self, on: bool) -> None:
-        self._throwing().streams = on
-
-    def bodies(self) -> tuple[np.ndarray, np.ndarray]:
-        t = self._throwing()
-        at = list(t.at)
-        return t.spheres.at(t.cast.position[at], t.cast.world_wxyz[at]), t.spheres.radius
-
-    def throw(
-        self,
-        position: np.ndarray,
-        goal: np.ndarray,
-        speed: float,
-        at: int = 0,
-        radius: float | None = None,
-    ) -> None:
-        self._throwing().throw(self._frame(), position, goal, speed, at, radius)
-
-    def throw_one(self, speed: float | None = None, radius: float | None = None) -> None:
-        self._throwing().throw_one(self._frame(), speed, radius)
-
-
 class Throwing:
     """Balls in flight at a cast of K characters."""
 

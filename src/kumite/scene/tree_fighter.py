@@ -169,10 +169,6 @@ class TreeFighter(Plain):
         fall = self.tree.response[:, FALL]
         return bool(player.wanted and np.any(self.tree.asked(player)[fall[fall != NOTHING]] > 0))
 
-    def label(self, stretch: int) -> str:
-        """What a stretch of the layer is called."""
-        return self.tree.labels[stretch]
-
     # Deciding ------------------------------------------------------------------------------------
 
     def decide(self, k: int) -> int:
